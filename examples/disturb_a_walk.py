@@ -6,7 +6,8 @@ import hexmj
 from hexmj.controllers.planning import planned_losses
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.settle import settle
-from hexmj.studies.disturbed_walks import Disturbed, collect_postures, disturbance_of, find_stable_starts
+from hexmj.studies.disturbed_plans import Disturbed, collect_postures
+from hexmj.studies.disturbed_walks import disturbance_of, find_stable_starts
 
 V, STARTS = 0.6, 12
 stride = hexmj.Stride()

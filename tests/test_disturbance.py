@@ -28,20 +28,16 @@ from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Sensed
 from hexmj.stability import stability_margin, walk_margin
 from hexmj.studies.disturbance import DisturbedWalks, every_case, with_flss_after
-from hexmj.studies.disturbed_walks import (
+from hexmj.studies.disturbed_plans import (
     PAUSE,
-    SETTLED,
-    Case,
     Disturbance,
     Disturbed,
     DisturbedPlan,
     Postures,
-    StableWalks,
     collect_postures,
-    disturbance_of,
-    find_stable_starts,
     reorganise,
 )
+from hexmj.studies.disturbed_walks import SETTLED, Case, StableWalks, disturbance_of, find_stable_starts
 from hexmj.sweep import run_study
 from tiers import few_of
 

@@ -17,7 +17,8 @@ from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
 from hexmj.phases import PAIRS
 from hexmj.starts import checked_starts, draw_starts
-from hexmj.studies.disturbed_walks import Disturbed, DisturbedPlan, collect_postures, disturbance_of, find_stable_starts
+from hexmj.studies.disturbed_plans import Disturbed, DisturbedPlan, collect_postures
+from hexmj.studies.disturbed_walks import disturbance_of, find_stable_starts
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
 
 if TYPE_CHECKING:

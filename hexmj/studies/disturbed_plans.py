@@ -1,0 +1,303 @@
+"""Plans that meet a disturbance (paper, Section 6), and the reorganisation of legs, the paper's first strategy.
+
+The legs go to the nearest of a small set of postures of undisturbed walking, with the states of its legs. Positions
+alone do not keep a walk stable.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from hexmj.controllers.planning import begin, begin_at_speed
+from hexmj.controllers.protocol import (
+    Controller,
+    FeedbackPlan,
+    Sensed,
+    SteerableController,
+    SteerablePlan,
+    check_steerable,
+)
+from hexmj.errors import InputError
+from hexmj.gaits import limit_gait
+from hexmj.stability import stability_margin, walk_margin
+from hexmj.starts import draw_starts
+from hexmj.timing import Acceleration, Stride
+from hexmj.walks import PlannedWalk, copied, joined
+
+Kind = Literal["halt", "leg", "push"]
+"""All legs are halted, one protracting leg is stopped, or the body is pushed, which a plan does not notice."""
+
+NEVER = 2**62
+"""Step of an event that has not happened."""
+
+POSTURES = 36
+"""Postures collected over one period."""
+
+CANDIDATES = 20
+"""Random starts; the first that reaches a stable steady-state gait gives the postures."""
+
+PAUSE = 4.0
+"""Time for which a halted body stands [time units]; up to V_p = 200 mm/s it suffices to lower feet in 20 ms."""
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """One disturbance of every start."""
+
+    kind: Kind
+    step: np.ndarray
+    """(start,) steps of the plan before the disturbance."""
+    leg: np.ndarray
+    """(start,) index of the leg that kind 'leg' stops; if it stands, the next protracting leg is stopped."""
+
+    def of(self, which: np.ndarray) -> "Disturbance":
+        """Return the disturbance of some starts, (n,) indices."""
+        return replace(self, step=self.step[which], leg=self.leg[which])
+
+    def awaited(self, standing: np.ndarray) -> np.ndarray:
+        """Return which starts, (start,), wait for a protracting leg, from the states of the legs, (start, leg)."""
+        return (self.kind == "leg") & np.all(standing, axis=1)
+
+    def legs(self, tips: np.ndarray, standing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return tips [mm] and states, both (start, leg), with which every start continues if it is disturbed now."""
+        if self.kind == "halt":
+            return tips, np.ones_like(standing)
+        if self.kind == "leg":
+            inorder = (self.leg[:, None] + np.arange(6)) % 6
+            first = np.argmin(np.take_along_axis(standing, inorder, axis=1), axis=1)
+            return tips, standing | (np.arange(6) == (self.leg + first)[:, None] % 6)
+        return tips, standing
+
+
+@dataclass(frozen=True, eq=False)
+class Postures:
+    """Postures of undisturbed walking."""
+
+    tips: np.ndarray
+    """(posture, leg) [mm]."""
+    standing: np.ndarray
+    """(posture, leg) legs that retract."""
+
+    def nearest(self, tips: np.ndarray) -> int:
+        """Return the posture with the least Euclidean distance over the six tips, (leg,) [mm]."""
+        return int(np.argmin(((self.tips - tips) ** 2).sum(axis=1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Steps for which the body stands still."""
+
+    tips: np.ndarray
+    """(step, leg) after each step [mm]."""
+    standing: np.ndarray
+    """(step, leg)."""
+
+    @property
+    def moves_back(self) -> np.ndarray:
+        """(step, leg) tips that move to the rear in each step; the end of such a swing is unknown."""
+        return np.diff(self.tips, axis=0, prepend=self.tips[:1]) < 0.0
+
+
+def collect_postures(controller: Controller, velocity: float, seed: int, stride: Stride) -> Postures:
+    """Return statically stable postures, evenly spread over one period of a steady-state gait at this velocity.
+
+    Raises:
+        InputError: no start reaches a stable periodic gait.
+    """
+    gait = limit_gait(controller, velocity, n_starts=CANDIDATES, seed=seed, stride=stride)
+    stable = gait.periodic & gait.stable
+    if not stable.any():
+        raise InputError(
+            f"strategy 'reorganise': no start of {controller.name} reaches a stable periodic gait at V = {velocity:g}"
+        )
+    start = int(np.argmax(stable))
+    plan = begin(controller, draw_starts(CANDIDATES, seed, stride)[start : start + 1], velocity, stride)
+    plan.advance(round(gait.reached[start] / stride.dt))
+    walk = plan.advance(round(gait.period[start] / stride.dt))
+    rows = np.linspace(0, len(walk.time), POSTURES, endpoint=False).astype(int)
+    rows = rows[walk_margin(walk)[rows, 0] > 0]
+    return Postures(walk.x[rows, 0], walk.stance[rows, 0])
+
+
+def stand(tips: np.ndarray, steps: int) -> Rest:
+    """Return a rest in which all legs stand at `tips`, (leg,) [mm]."""
+    return Rest(np.tile(tips, (steps, 1)), np.ones((steps, 6), dtype=bool))
+
+
+def reorganise(tips: np.ndarray, goal: np.ndarray, stride: Stride) -> Rest:
+    """Return a rest in which one leg after the other moves from its tip to its goal, both (leg,) [mm], at V_p.
+
+    The next leg is the one without which the others support the body best. Legs within one step of their goal stay.
+    """
+    now, left = tips.copy(), [int(leg) for leg in np.flatnonzero(np.abs(goal - tips) > stride.dt)]
+    rows, states = [], []
+    while left:
+        leg = max(left, key=lambda leg: _margin_without(leg, now, stride))
+        left.remove(leg)
+        way = goal[leg] - now[leg]
+        for n in range(int(np.ceil(abs(way) / stride.dt)) - 1, -1, -1):
+            now[leg] = goal[leg] - np.sign(way) * n * stride.dt
+            rows.append(now.copy())
+            states.append((np.arange(6) != leg) | (n == 0))
+    return Rest(np.array(rows).reshape(-1, 6), np.array(states, dtype=bool).reshape(-1, 6))
+
+
+def _margin_without(leg: int, tips: np.ndarray, stride: Stride) -> float:
+    """Return the stability margin while one leg is up [mm]."""
+    geometry = stride.geometry
+    feet = np.stack([tips + np.array(geometry.origin), np.array(geometry.y)], axis=-1)
+    return float(stability_margin(feet, np.arange(6) != leg, threads=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbed:
+    """A controller with one disturbance of every start, and a strategy against it.
+
+    Without a strategy a halted body stands for `PAUSE`, then the plan starts from there; other walks continue at once.
+    With postures the body is halted too, reorganises its legs and continues from the posture, its states included. If
+    it slows down, it continues with V_r(0), and Eq. 11 brings it back to V. With sensory feedback the leg that is
+    stopped is one that protracts in reality; if none does, the next one that does.
+    """
+
+    controller: SteerableController
+    """Plans before and after the disturbance."""
+    disturbance: Disturbance
+    """Disturbance of the starts at which a plan begins."""
+    postures: Postures | None = None
+    """If given, the legs are reorganised to the nearest of these."""
+    slows: bool = False
+    """Whether the walk slows down to V_r(0) of the acceleration after the disturbance."""
+
+    @property
+    def name(self) -> str:
+        """Name of the controller, with a remark."""
+        return f"{self.controller.name}, disturbed"
+
+    def begin(
+        self,
+        starts: np.ndarray,
+        velocity: np.ndarray,
+        stride: Stride,
+        acceleration: Acceleration | None = None,
+        threads: int | None = None,
+    ) -> "DisturbedPlan":
+        """Return a plan, see `protocol.Controller.begin`.
+
+        Raises:
+            InputError: the controller's plans cannot be steered, or the disturbance is that of other starts.
+        """
+        check_steerable(self.controller)
+        if (count := len(self.disturbance.step)) != len(starts):
+            raise InputError(f"a disturbance of {count} starts; expected one of {len(starts)}")
+        plan = begin_at_speed(self.controller, starts, velocity, stride, acceleration, threads)
+        return DisturbedFeedbackPlan(self, plan) if isinstance(plan, FeedbackPlan) else DisturbedPlan(self, plan)
+
+
+class DisturbedPlan:
+    """A `protocol.SteerablePlan` of a `Disturbed` controller."""
+
+    def __init__(self, controller: Disturbed, plan: SteerablePlan) -> None:
+        """Wrap a plan at time 0."""
+        self._plan, self._disturbance, self._postures = plan, controller.disturbance, controller.postures
+        self.starts, self.stride, self.done = plan.starts, plan.stride, 0
+        self.made_for, self._slows = getattr(plan, "made_for", None), controller.slows
+        self._step, self._sensed = self._disturbance.step.copy(), False
+        self._stops = self._disturbance.kind == "halt" or self._postures is not None
+        self._rests: dict[int, Rest] = {}
+        self._tips, self._standing = np.array(self.starts), np.ones(self.starts.shape, dtype=bool)
+        self._beside = np.tile(np.array(self.stride.geometry.y, dtype=float), (len(self.starts), 1))
+        self._held = self._beside.copy()
+        self.resumed = np.full(len(self.starts), NEVER)
+        """(start,) steps before the plan continues, known as soon as the start has been disturbed."""
+
+    def advance(self, steps: int) -> PlannedWalk:
+        """Return the next steps; they do not depend on how the walk is divided into calls."""
+        end, parts = self.done + steps, []
+        while self.done < end:
+            now = self._step == self.done
+            awaited = now & self._sensed & self._disturbance.awaited(self._plan.standing)
+            self._step[awaited] += 1
+            self._disturb(now & ~awaited)
+            self._resume(self.resumed == self.done)
+            coming = np.concatenate([self._step, self.resumed, [end]])
+            parts.append(self._go_on(int(coming[coming > self.done].min()) - self.done))
+        return joined(parts)
+
+    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
+        """Continue from these tips [mm] and states, both (start, leg); a resting start keeps to its rest."""
+        self._plan.see(tips, standing)
+        self._sensed = True
+
+    @property
+    def tips(self) -> np.ndarray:
+        """See `protocol.SteerablePlan`."""
+        return self._plan.tips
+
+    @property
+    def standing(self) -> np.ndarray:
+        """See `protocol.SteerablePlan`."""
+        return self._plan.standing
+
+    def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        self._plan.restart(which, tips)
+
+    def slow_down(self, which: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        self._plan.slow_down(which)
+
+    def _disturb(self, which: np.ndarray) -> None:
+        """Disturb these starts, (start,): set how long they rest, and the legs with which they continue."""
+        tips, standing = self._disturbance.legs(self._plan.tips, self._plan.standing)
+        self._tips[which], self._standing[which], self._held[which] = tips[which], standing[which], self._beside[which]
+        self.resumed[which] = self.done
+        for start in np.flatnonzero(which & self._stops).tolist():
+            rest = self._rest(tips[start])
+            self._rests[start] = rest
+            self.resumed[start] += len(rest.tips)
+            self._tips[start] = rest.tips[-1]
+            if self._postures:
+                self._standing[start] = self._postures.standing[self._postures.nearest(tips[start])]
+
+    def _rest(self, tips: np.ndarray) -> Rest:
+        """Return the rest of a start that is halted with these tips, (leg,) [mm]."""
+        pause = stand(tips, round(PAUSE / self.stride.dt))
+        if not self._postures:
+            return pause
+        moves = reorganise(tips, self._postures.tips[self._postures.nearest(tips)], self.stride)
+        return Rest(np.concatenate([pause.tips, moves.tips]), np.concatenate([pause.standing, moves.standing]))
+
+    def _resume(self, which: np.ndarray) -> None:
+        """Let the plan of these starts, (start,), continue, or begin again after a rest."""
+        if not which.any():
+            return
+        if self._stops:
+            self._plan.restart(which.copy(), self._tips.copy())
+        if self._slows:
+            self._plan.slow_down(which.copy())
+        legs = which[:, None]
+        self._plan.see(np.where(legs, self._tips, self._plan.tips), np.where(legs, self._standing, self._plan.standing))
+
+    def _go_on(self, steps: int) -> PlannedWalk:
+        """Plan steps without an event; the plan of a resting start is replaced by its rest."""
+        before = self.done
+        walk = copied(self._plan.advance(steps))
+        self.done, self._beside = self.done + steps, walk.y[-1].copy()
+        for start, rest in self._rests.items():
+            if before < self.resumed[start]:
+                rows = slice(before - self._step[start], before - self._step[start] + steps)
+                walk.velocity[:, start] = 0.0
+                walk.x[:, start], walk.stance[:, start] = rest.tips[rows], rest.standing[rows]
+                walk.y[:, start], walk.height[:, start] = self._held[start], np.nan
+                walk.aep[:, start] = np.where(rest.moves_back[rows], np.nan, self.stride.aep0)
+        return walk
+
+
+class DisturbedFeedbackPlan(DisturbedPlan):
+    """The same for a `protocol.FeedbackPlan`."""
+
+    def sense(self, sensed: Sensed) -> None:
+        """Pass on the sensed legs."""
+        self._sensed = True
+        self._plan.sense(sensed)  # pyright: ignore[reportAttributeAccessIssue]
