@@ -1,7 +1,7 @@
-"""Gaits (paper, Section 5.3): limit regimes, their period, duty factors and relative phases.
+"""Steady-state gaits (paper, Section 5.3): their period, duty factors and relative phases.
 
-A leg's movement is timed by its onsets, the instants at which it is raised and protraction begins.  The paper prints
-no event and no threshold: the onset, `TOLERANCE` and `CYCLES` are conventions of ours.
+A leg's movement is timed by its onsets, when it is raised and protraction begins. The paper prints no event and no
+threshold: the onset, `TOLERANCE` and `CYCLES` are our conventions.
 """
 
 from dataclasses import dataclass
@@ -10,23 +10,22 @@ import numpy as np
 
 from hexmj.controllers.planning import advanced, begin
 from hexmj.controllers.protocol import Controller
-from hexmj.diagrams import footfall_html
 from hexmj.errors import InputError
 from hexmj.phases import PAIRS, circular_mean
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.validate import number, whole
-from hexmj.walks import Walk, part_of
+from hexmj.walks import Walk, footfall_html, part_of
 
 TOLERANCE = 0.002
-"""A regime lasts while no leg's cycle or lag differs from the last one by more than this part of the period ..."""
+"""Greatest change of a leg's cycle or lag within a steady-state gait, as a fraction of the period ..."""
 
 STEPS = 5
-"""... and this many time steps more, since states change only at whole steps and controllers hand that jitter on."""
+"""... plus this number of time steps, since states change only at whole steps and controllers pass on the jitter."""
 
 CYCLES = 10
-"""Fewest whole cycles of every leg that show a limit regime; some settle so slowly that three look alike too soon."""
+"""Fewest whole cycles of every leg that show a steady-state gait; some settle so slowly that three are alike early."""
 
 FINE = Stride(dt=0.01)
 """The stride with the time step of Figs. 5 and 6."""
@@ -37,69 +36,68 @@ PART = 4096
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Gait:
-    """The limit regime of each start; NaN where no periodic one was reached, as where a leg never swings."""
+    """The steady-state gait of each start; NaN where none was reached, for example where a leg never swings."""
 
     period: np.ndarray
     """(start,) mean over the legs [time units]."""
     periods: np.ndarray
     """(start, leg) each leg's own [time units]."""
     duty_factor: np.ndarray
-    """(start, leg) part of its period for which a leg stands, of the cycles whose swings last as long as the last."""
+    """(start, leg) fraction of its period for which a leg stands, over cycles whose swings last as long as the last."""
     phase: np.ndarray
     """(start, pair) Phi_{j-k} in [0, 1), in the order of `PAIRS`."""
     reached: np.ndarray
-    """(start,) onset of leg 1 from which on the regime lasts [time units]; inf where it does not within the walk."""
+    """(start,) onset of leg 1 at which the steady-state gait begins [time units]; inf where there is none."""
     periodic: np.ndarray
-    """(start,) True if from some onset to the end all legs keep one period and their lags, over `CYCLES` cycles or
-    more."""
+    """(start,) whether all legs keep one period and their lags to the end of the walk, for `CYCLES` or more."""
     stable: np.ndarray
-    """(start,) True if static stability is kept throughout the last period of the walk; where there is no periodic
-    regime, for `CYCLES` times the longest of the legs' last cycles, or all that is kept if a leg has none."""
+    """(start,) whether static stability is kept in the last period of the walk; where the gait is not periodic, in the
+    last `CYCLES` times the longest of the legs' last cycles, or throughout the known steps if a leg has no cycle."""
 
     def __repr__(self) -> str:
         known, line = self.periodic, f"Gait(of {len(self.periodic)}: periodic {int(self.periodic.sum())}"
         line += f", stable {int(self.stable.sum())}"
         if known.any():
-            mean = {pair: float(circular_mean(self.phase[known, n])) for n, pair in enumerate(PAIRS) if pair in TOLD}
+            mean = {pair: float(circular_mean(self.phase[known, n])) for n, pair in enumerate(PAIRS) if pair in SHOWN}
             phases = ", ".join(f"{pair} {round(one, 2) % 1.0:.2f}" for pair, one in mean.items())
             line += f"; period {self.period[known].mean():.4g} time units, duty factor"
             line += f" {self.duty_factor[known].mean():.2f}, phases {phases}"
         return f"{line})"
 
     def _repr_html_(self) -> str | None:
-        """What a notebook shows: two periods of the first periodic regime."""
+        """Return the footfall diagram that a notebook shows: two periods of the first periodic gait."""
         if not self.periodic.any():
             return None
         start = int(np.argmax(self.periodic))
         phase, time = dict(zip(PAIRS, self.phase[start], strict=True)), np.linspace(0.0, 2.0, 801)[1:]
         onset = np.cumsum([[0.0, phase["1-2"], phase["2-3"]], [phase["1-4"], phase["4-5"], phase["5-6"]]], axis=1)
-        protracted = (time[:, np.newaxis] - onset.ravel()) % 1.0  # since its onset, of a period
+        protracted = (time[:, np.newaxis] - onset.ravel()) % 1.0  # time since the onset, in periods
         swings = protracted < 1.0 - self.duty_factor[start]
         return footfall_html(repr(self), time * self.period[start], swings, f"start {start}")
 
 
-TOLD = ("1-2", "2-3", "1-4")
+SHOWN = ("1-2", "2-3", "1-4")
 """Pairs whose phases `repr` shows."""
 
 
 def gait(walk: Walk) -> Gait:
-    """The gait of every start of a walk that ends with a constant velocity.
+    """Return the gait of every start of a walk that ends with a constant velocity.
 
-    A leg that is raised in the walk's first step has no onset there: what stood before is not known.
+    A leg that is raised in the first step has no onset there, since its state before is not known.
 
     Raises:
-        InputError: a walk of fewer than two steps, or of no starts.
+        InputError: the walk has fewer than two steps, or no starts.
     """
     if len(walk.time) < 2:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
     if not walk.stance.shape[1]:
         raise InputError("a walk of 0 starts; expected at least 1")
-    regimes = _regimes(*_changes(walk.stance), walk.time, walk.stance.shape[1])
-    longest = int(_steps(regimes["looked_at"], walk.time).max())
-    return _with_stability(regimes, walk_margin(part_of(walk, slice(-longest, None))) > 0, walk.time)
+    found = _gaits(*_changes(walk.stance), walk.time, walk.stance.shape[1])
+    longest = int(_steps(found["looked_at"], walk.time).max())
+    return _with_stability(found, walk_margin(part_of(walk, slice(-longest, None))) > 0, walk.time)
 
 
-def limit_gait(
+def steady_state_gait(
     controller: Controller,
     velocity: float,
     *,
@@ -110,9 +108,9 @@ def limit_gait(
     periods: int = 80,
     threads: int | None = None,
 ) -> Gait:
-    """The gaits that a controller reaches from random starts, as in Figs. 5 and 6.
+    """Return the gaits that a controller reaches from random starts, as in Figs. 5 and 6.
 
-    Of the walks only the changes of state and the stability of the last periods are kept.
+    Only the changes of state and the stability of the last periods of a walk are kept in memory.
 
     Args:
         controller: plans the walks.
@@ -121,8 +119,8 @@ def limit_gait(
         seed: of the starts.
         stride: step range, lines of the tips and time step.
         acceleration: the accelerating procedure of Eq. 11.
-        periods: cycles that every leg has time for once the velocity is reached; slow walks of LDVS need the default.
-        threads: one per core unless given; the result does not depend on it.
+        periods: cycles of every leg after the velocity is reached; slow walks of LDVS need the default.
+        threads: by default one per core; the result does not depend on it.
     """
     if not 0 < number("velocity", velocity) < 1:
         raise InputError(f"velocity = {velocity}; expected 0 < V < 1")
@@ -144,23 +142,21 @@ def limit_gait(
             upright.append(walk_margin(part) > 0)
     time = np.arange(steps + 1) * stride.dt
     row, foot, down = (np.concatenate(column) for column in zip(*changes, strict=True))
-    return _with_stability(_regimes(row, foot, down, time, n_starts), np.concatenate(upright), time)
+    return _with_stability(_gaits(row, foot, down, time, n_starts), np.concatenate(upright), time)
 
 
 def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The changes of state in (step, start, leg): rows that differ from the row before, foot, new state.
-
-    Feet are numbered through all starts, foot = 6 start + leg.
-    """
+    """Return the changes of state in (step, start, leg): row after the change, foot = 6 start + leg, and new state."""
     state = stance.reshape(len(stance), -1)
     row, foot = np.divmod(np.flatnonzero(state[1:] != state[:-1]), state.shape[1])
     return row + 1, foot, state[row + 1, foot]
 
 
-def _regimes(
+def _gaits(
     row: np.ndarray, foot: np.ndarray, down: np.ndarray, time: np.ndarray, n_starts: int
 ) -> dict[str, np.ndarray]:
-    """The fields of `Gait` but `stable`, for which is `looked_at`: how long before the end [time units], (start,)."""
+    """Return the fields of `Gait`, with `looked_at` instead of `stable`: the time at the end of the walk in which
+    stability is evaluated [time units], (start,)."""
     raised = _by_foot(row[~down], foot[~down], 6 * n_starts)
     lowered = _by_foot(row[down], foot[down], 6 * n_starts)
     periods, duty_factor = np.full((n_starts, 6), np.nan), np.full((n_starts, 6), np.nan)
@@ -196,15 +192,15 @@ def _regimes(
 
 
 def _by_foot(row: np.ndarray, foot: np.ndarray, feet: int) -> list[np.ndarray]:
-    """The rows of each foot, in order."""
+    """Return the rows of each foot, in order."""
     order = np.argsort(foot, kind="stable")
     return np.split(row[order], np.searchsorted(foot[order], np.arange(1, feet)))
 
 
 def _cycles(raised: list[np.ndarray], lowered: list[np.ndarray]) -> np.ndarray:
-    """Rows of onset, touchdown and next onset of every leg, (3, cycle, leg).
+    """Return the rows of onset, touchdown and next onset of every leg, (3, cycle, leg).
 
-    Cycle n of a leg is the first one that begins when the n-th of leg 1 does, or later.
+    Cycle n of a leg is the first that begins together with or after cycle n of leg 1.
     """
     following = [np.searchsorted(r, raised[0]) for r in raised]
     whole = min(np.count_nonzero(i + 1 < len(r)) for i, r in zip(following, raised, strict=True))
@@ -215,7 +211,7 @@ def _cycles(raised: list[np.ndarray], lowered: list[np.ndarray]) -> np.ndarray:
 
 
 def _settled(begin: np.ndarray, end: np.ndarray, resolution: float) -> int:
-    """The first of the cycles, (cycle, leg) [time units], from which on periods and lags are those of the last one."""
+    """Return the first of the cycles, (cycle, leg) [time units], from which periods and lags equal the last ones."""
     if len(begin) == 0:
         return 0
     length, lag = end - begin, begin - begin[:, :1]
@@ -226,31 +222,31 @@ def _settled(begin: np.ndarray, end: np.ndarray, resolution: float) -> int:
 
 
 def _has_ended(end: np.ndarray, raised: list[np.ndarray], time: np.ndarray) -> bool:
-    """Whether a leg is not raised again where it is due within the walk, by the ends of its cycles, (cycle, leg)
-    [time units], and the rows of its onsets."""
+    """Whether a leg that is due is not raised again, by the ends of its cycles, (cycle, leg) [time units], and the rows
+    of its onsets."""
     last = time[[rows[-1] for rows in raised]]
     due = last + (1.0 + TOLERANCE) * (end[-1, 0] - end[-2, 0]) + STEPS * _resolution(time)
     return bool((due < time[-1]).any())
 
 
 def _like_the_last(change: np.ndarray, resolution: float) -> int:
-    """The first of the cycles from which on all are like the last one, by how far each differs from it, (cycle, leg);
-    that and the time step in parts of the period."""
+    """Return the first cycle from which all equal the last, by their differences from it, (cycle, leg), and the time
+    step, both in periods."""
     unlike = np.flatnonzero(change.max(axis=1) > TOLERANCE + STEPS * resolution)
     return int(unlike[-1]) + 1 if len(unlike) else 0
 
 
 def _steps(duration: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Steps of each duration, rounded up and within the walk."""
+    """Return the steps of each duration, rounded up and within the walk."""
     return np.ceil(np.clip(duration / _resolution(time), 1, len(time))).astype(int)
 
 
 def _resolution(time: np.ndarray) -> float:
-    """The time step of a walk [time units]."""
+    """Return the time step of a walk [time units]."""
     return float((time[-1] - time[0]) / (len(time) - 1))
 
 
-def _with_stability(regimes: dict[str, np.ndarray], upright: np.ndarray, time: np.ndarray) -> Gait:
-    """The regimes, and whether each is upright, (step, start), as long as is looked at."""
-    ends = enumerate(_steps(regimes.pop("looked_at"), time))
-    return Gait(**regimes, stable=np.array([bool(upright[-steps:, start].all()) for start, steps in ends]))
+def _with_stability(found: dict[str, np.ndarray], upright: np.ndarray, time: np.ndarray) -> Gait:
+    """Return the gaits; each is stable if all its last steps are upright, (step, start)."""
+    ends = enumerate(_steps(found.pop("looked_at"), time))
+    return Gait(**found, stable=np.array([bool(upright[-steps:, start].all()) for start, steps in ends]))

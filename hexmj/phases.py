@@ -22,20 +22,19 @@ The paper's contralateral pairs (1-3), (2-4), (5-6) are taken for a misprint of 
 """
 
 IPSILATERAL, CONTRALATERAL = slice(0, 4), slice(4, 7)
-"""Where the two kinds lie on a ``pair`` axis."""
+"""The two kinds on an axis `pair`."""
 
 NEAR = 0.05
-"""Phases that differ by no more than this count as equal where a gait is named."""
+"""Greatest difference of phases that count as equal when a gait is named."""
 
 ROUNDING = 1e-12
-"""Directions whose mean is no longer than this, as a fraction of the circle's radius, balance."""
+"""Greatest length of the mean of directions that balance, as a fraction of the circle's radius."""
 
 GaitName = Literal["tripod", "positive metachrony", "negative metachrony", "other"]
 
 
 def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
-    """Mean direction of phases on the circle [0, 1), along an axis or of all; NaN where they balance, such as 0 and
-    0.5, and have none.
+    """Return the mean direction of phases on the circle [0, 1), along an axis or of all; NaN where they balance.
 
     Raises:
         InputError: there are no phases.
@@ -50,11 +49,7 @@ def circular_mean(phase: ArrayLike, axis: int | None = None) -> np.ndarray:
 
 
 def circular_range(phase: ArrayLike) -> np.ndarray:
-    """The shortest arc of the circle [0, 1) that holds all phases of a row, (row, n) -> (row,).
-
-    Raises:
-        InputError: no numbers, or no rows of at least one.
-    """
+    """Return the shortest arc of the circle [0, 1) that holds all phases of a row, (row, n) -> (row,)."""
     rows = numbers("phase", phase)
     if rows.ndim != 2 or not rows.shape[1]:
         raise InputError(f"phase has the shape {rows.shape}; expected (row, n), rows of at least one")
@@ -63,11 +58,9 @@ def circular_range(phase: ArrayLike) -> np.ndarray:
 
 
 def unrolled(phase: ArrayLike) -> np.ndarray:
-    """Phases, (n,), beside their mean direction on the circle: 0.02 is 1.02 among some around 0.98, NaN stays NaN, and
-    so do phases that have no such direction.
+    """Return phases, (n,), near their mean direction on the circle: 0.02 becomes 1.02 among some around 0.98.
 
-    Raises:
-        InputError: no numbers.
+    NaN stays NaN; phases without a mean direction stay as they are.
     """
     phase = numbers("phase", phase)
     known = phase[np.isfinite(phase)]
@@ -76,14 +69,14 @@ def unrolled(phase: ArrayLike) -> np.ndarray:
 
 
 def wilson_phase(v: ArrayLike) -> np.ndarray:
-    """Ipsilateral phase of Wilson's Gait II at velocity V, 1 / (1 + V).
+    """Return the ipsilateral phase of Wilson's Gait II at velocity V, 1 / (1 + V).
 
-    The paper says: a front leg begins protraction when the leg behind it ends its own (zero delay), and the duration
-    of protraction and the range of motion do not depend on velocity.  The formula follows: protraction takes
-    V / (1 + V) of the period, and by that part the front leg lags behind.
+    A front leg begins protraction when the leg behind it ends its own (zero delay), and the duration of protraction
+    and the range of motion do not depend on velocity. So protraction takes V / (1 + V) of the period, and by this
+    fraction the front leg lags behind.
 
     Raises:
-        InputError: velocities that are none.
+        InputError: a velocity is not between 0 and 1.
     """
     velocity = numbers("velocity", v)
     if ((velocity < 0) | (velocity > 1)).any():
@@ -94,9 +87,9 @@ def wilson_phase(v: ArrayLike) -> np.ndarray:
 def classify(phase_12: float, phase_23: float, contralateral: float) -> GaitName:
     """Name a gait by its phases, as Section 5.3 does.
 
-    Neighbours across the body move in anti-phase, within `NEAR`, or the gait is 'other'.  'tripod': so do those
-    along the sides.  'positive metachrony': Phi_{1-2} and Phi_{2-3} above 0.5, protraction runs hind, middle, front.
-    'negative metachrony': both between 0 and 0.5, front, middle, hind.
+    Neighbours across the body move in anti-phase, within `NEAR`, or the gait is 'other'. In a 'tripod' neighbours along
+    the sides do so too. 'positive metachrony': Phi_{1-2} and Phi_{2-3} are above 0.5, and protraction runs from hind to
+    front. 'negative metachrony': both are between 0 and 0.5, and protraction runs from front to hind.
     """
     along = phase_12, phase_23
     if not abs(contralateral - 0.5) <= NEAR:

@@ -18,7 +18,7 @@ OBSERVATION_TIMES = ("walk", "start")
 """Named observation times, see `observation_duration`."""
 
 MOST_STEPS = 10**7
-"""Longest walk [steps]; far beyond any use."""
+"""Longest walk [steps]."""
 
 AT_SPEED = 10**9
 """Steps after which every acceleration has ended."""
@@ -27,7 +27,7 @@ LEAST_STEP = 1e-5
 """Shortest time step of a plan [time units]; a ten-thousandth of the usual one."""
 
 FAR = 1e6
-"""Farther than any leg reaches [mm]."""
+"""Greatest coordinate of a tip, beyond the reach of any leg [mm]."""
 
 
 @dataclass(frozen=True)
@@ -79,18 +79,9 @@ class Acceleration:
         """Time until V_r is reached [time units]."""
         return (velocity - self.start) / self.rate
 
-    def lag(self, velocity: Any, time: Any) -> Any:
-        """What is walked less within a time [time units] by Eq. 11 than at V_r throughout [mm]."""
-        short = np.minimum(time, self.duration(velocity))
-        return (velocity - self.start) * short - self.rate * short**2 / 2
-
 
 def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Acceleration | None) -> None:
-    """Refuse velocities V_r, (...) fractions of V_p, that an acceleration (Eq. 11) steps over.
-
-    Raises:
-        InputError: V_r and the growth of V in a time step are 1 or more together.
-    """
+    """Raise InputError if V_r, (...) fractions of V_p, and the growth of V in a time step (Eq. 11) reach 1 together."""
     if acceleration and not (velocity + acceleration.rate * stride.dt < 1.0).all():
         raise InputError(
             f"V = {velocity.max():g} is reached in steps of {acceleration.rate * stride.dt:g};"
@@ -99,37 +90,33 @@ def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Accelerati
 
 
 def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acceleration | None) -> None:
-    """Refuse V_r, (velocity,) fractions of V_p, not reached by Eq. 11 within a time, (velocity,) [time units].
-
-    Raises:
-        InputError: one of them.
-    """
+    """Raise InputError if V_r, (velocity,), is not reached by Eq. 11 within a time, (velocity,) [time units]."""
     if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity) * (1.0 - 1e-9))).size:
         v, end = velocity[late[0]], duration[late[0]]
         raise InputError(
-            f"V = {v:g} is reached at {acceleration.duration(v):g} time units, after the observation time of {end:g};"
-            " expected a longer one, or 'walk' or 'start', which begin when V is reached"
+            f"V = {v:g} is reached at {acceleration.duration(v):g} time units; expected an observation time longer than"
+            f" {end:g}, or 'walk' or 'start', which begin when V is reached"
         )
 
 
 def observation_duration(
     observation_time: str | float, velocity: ArrayLike, stride: Stride, acceleration: Acceleration | None = None
 ) -> np.ndarray:
-    """The time t of Eq. 7 for each velocity [time units], which the paper leaves open.
+    """Return the time t of Eq. 7 for each velocity [time units], which the paper leaves open.
 
     'walk' is three periods of a single leg oscillator, 3 (AEP_0 - PEP_0) (1 + 1/V); 'start' is
-    2 (AEP_0 - PEP_0) / V_p.  When accelerating, a named observation time is counted from the time at which V is
-    reached; a number is always the whole time.
+    2 (AEP_0 - PEP_0) / V_p. When accelerating, a named observation time begins when V is reached; a number is the whole
+    time.
 
     Raises:
-        InputError: no such observation time, or V = 0 with the observation time 'walk'.
+        InputError: there is no such observation time, or V is 0 with the observation time 'walk'.
     """
     v = numbers("velocity", velocity)
     if not isinstance(observation_time, str):
         return np.full(v.shape, number("observation_time", observation_time))
     if observation_time not in OBSERVATION_TIMES:
         raise InputError(
-            f"observation_time = {observation_time!r}; expected {', '.join(OBSERVATION_TIMES)} or a number of time units"
+            f"observation_time = {observation_time!r}; expected {', '.join(OBSERVATION_TIMES)} or a number"
         )
     if observation_time == "walk" and (odd := v[~(v > 0)]).size:
         raise InputError(f"velocity = {odd[0]:g} has no period; expected V > 0 with the observation time 'walk'")
@@ -138,10 +125,10 @@ def observation_duration(
 
 
 def steps_within(duration: ArrayLike, stride: Stride) -> np.ndarray:
-    """Whole steps of a plan within an observation time [time units].
+    """Return the whole steps of a plan within an observation time [time units].
 
     Raises:
-        InputError: less than a step, or more than `MOST_STEPS`.
+        InputError: the time is shorter than a step, or longer than `MOST_STEPS`.
     """
     duration, dt = numbers("duration", duration), stride.dt
     if (odd := duration[~((duration >= dt) & (duration <= MOST_STEPS * dt))]).size:
@@ -153,12 +140,12 @@ def steps_within(duration: ArrayLike, stride: Stride) -> np.ndarray:
 def commanded_velocities(
     velocity: np.ndarray, done: int | np.ndarray, steps: int, stride: Stride, acceleration: Acceleration | None
 ) -> np.ndarray:
-    """V_r during each of the `steps` after `done`, (step, start): Eq. 11, or V itself without an acceleration.
+    """Return V_r during each of the `steps` after `done`, (step, start), by Eq. 11; V itself without an acceleration.
 
     Args:
         velocity: final V_r, (start,).
-        done: steps for which it has been accelerating, of each start, (start,), or of all.
-        steps: how many are asked for.
+        done: steps since the acceleration began, (start,), or one number for all.
+        steps: number of steps.
         stride: with the time step.
         acceleration: Eq. 11.
     """

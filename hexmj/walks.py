@@ -1,13 +1,13 @@
-"""The one type of walk that both measures of stability read, and what a plan adds to it for the body."""
+"""The type of walk that both measures of stability read, what a plan adds for the body, and footfall diagrams."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
+from html import escape
 from typing import Any, TypeVar
 
 import numpy as np
 
-from hexmj.diagrams import footfall_html
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, LEGS, Geometry
 from hexmj.validate import whole
@@ -46,7 +46,7 @@ class Walk:
         return f"{type(self).__name__}({extent(self)})"
 
     def _repr_html_(self) -> str | None:
-        """What a notebook shows."""
+        """Return the footfall diagram that a notebook shows."""
         if len(self.time) < 2 or not self.stance.shape[1]:
             return None
         known = ~np.isnan(self.x[:, 0])
@@ -63,14 +63,14 @@ class PlannedWalk(Walk):
     """A walk as planned, with what a body needs to lift and lower the feet."""
 
     aep: np.ndarray = field(kw_only=True)
-    """(step, start, leg) where the swing that a leg is in will end, on its own axis [mm], so that the body can lower
-    the foot in time; NaN where nothing tells: then it is lowered once the leg stands."""
+    """(step, start, leg) end of the present swing on the leg's own axis [mm], so that the body can lower the foot in
+    time; where it is NaN the foot is lowered once the leg stands."""
     height: np.ndarray = field(kw_only=True)
-    """(step, start, leg) of the tip above the ground it walks on [mm]; NaN where the body shall lift and lower it."""
+    """(step, start, leg) height of the tip above the ground [mm]; the body lifts and lowers tips with NaN."""
 
 
 def extent(walk: Walk) -> str:
-    """How many steps and starts a walk has, how long it is and how fast, in a line."""
+    """Describe the steps, duration, starts and velocities of a walk in one line."""
     steps, starts = walk.stance.shape[:2]
     known = walk.velocity[np.isfinite(walk.velocity)]
     ends = sorted({f"{v:.3g}" for v in (known.min(), known.max())}, key=float) if len(known) else ["unknown"]
@@ -79,47 +79,83 @@ def extent(walk: Walk) -> str:
 
 
 PLANNED = ("x", "y", "stance", "aep", "height")
-"""What a plan says of every step, start and leg."""
+"""Names of what a plan gives for every step, start and leg."""
 
 AnyWalk = TypeVar("AnyWalk", bound=Walk)
 
 
 def joined(walks: Sequence[AnyWalk]) -> AnyWalk:
-    """One walk of the same starts out of those that follow each other."""
+    """Join walks of the same starts that follow each other."""
     if len(walks) == 1:
         return walks[0]
     return replace(
-        walks[0], **{name: np.concatenate([getattr(one, name) for one in walks]) for name in _arrays(type(walks[0]))}
+        walks[0], **{name: np.concatenate([getattr(walk, name) for walk in walks]) for name in _arrays(type(walks[0]))}
     )
 
 
 def one_start(walk: AnyWalk, start: int) -> AnyWalk:
-    """The walk of one start, its axis kept.
+    """Return the walk of one start, (step, 1, leg).
 
     Raises:
         InputError: there is no such start.
     """
-    count = walk.stance.shape[1]
-    whole("start", start, 0, count - 1)
+    whole("start", start, 0, walk.stance.shape[1] - 1)
     return of_starts(walk, slice(start, start + 1))
 
 
 def of_starts(walk: AnyWalk, which: Any) -> AnyWalk:
-    """The walks of some starts."""
+    """Return the walks of some starts."""
     return replace(walk, **{name: getattr(walk, name)[:, which] for name in _arrays(type(walk)) if name != "time"})
 
 
 def part_of(walk: AnyWalk, steps: slice) -> AnyWalk:
-    """Some steps of a walk."""
+    """Return some steps of a walk."""
     return replace(walk, **{name: getattr(walk, name)[steps] for name in _arrays(type(walk))})
 
 
 def copied(walk: AnyWalk) -> AnyWalk:
-    """The same walk in arrays of its own."""
+    """Return the same walk in new arrays."""
     return replace(walk, **{name: getattr(walk, name).copy(order="K") for name in _arrays(type(walk))})
 
 
 @cache
 def _arrays(kind: type[Walk]) -> list[str]:
-    """Names of what a walk holds of every step."""
-    return [one.name for one in fields(kind) if one.name != "geometry"]
+    """Return the names of a walk's arrays."""
+    return [field.name for field in fields(kind) if field.name != "geometry"]
+
+
+def spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:
+    """Return begin and length of each period in which `on`, (step,), is true; `time` is that of the steps' ends."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
+    step = time[1] - time[0] if len(time) > 1 else 0.0
+    return [(float(time[a] - step), float((b - a) * step)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def footfall_html(line: str, time: np.ndarray, swings: np.ndarray, note: str) -> str:
+    """Return a line of text and a footfall diagram below it, for notebooks: a bar for each swing.
+
+    Args:
+        line: the text.
+        time: at the end of each step, (step,), at least two [time units].
+        swings: which feet are off the ground, (step, leg).
+        note: text below the bars, beside the time.
+    """
+    width, row, left = 640, 14, 28  # of the bars, of a leg, and of the names of legs [pixels]
+    step = time[1] - time[0]
+    begin, scale = time[0] - step, width / (time[-1] - time[0] + step)
+    bars = [
+        f'<rect x="{left + scale * (at - begin):.1f}" y="{row * leg + 2}" width="{scale * length:.1f}"'
+        f' height="{row - 4}"/>'
+        for leg in range(len(LEGS))
+        for at, length in spans(time, swings[:, leg])
+    ]
+    names = [f'<text x="0" y="{row * (leg + 1) - 3}">{name}</text>' for leg, name in enumerate(LEGS)]
+    low = row * (len(LEGS) + 1)
+    axis = [
+        f'<text x="{left}" y="{low}">{begin:.4g}</text>',
+        f'<text x="{left + width / 2}" y="{low}" text-anchor="middle">bars: foot off the ground; {escape(note)}</text>',
+        f'<text x="{left + width}" y="{low}" text-anchor="end">{time[-1]:.4g} time units</text>',
+    ]
+    style = 'style="max-width: 100%" fill="currentColor" font-family="sans-serif" font-size="11"'
+    box = f'viewBox="0 0 {left + width} {low + 4}" width="{left + width}"'
+    return f"<p>{escape(line)}</p><svg {box} {style}>{''.join(bars + names + axis)}</svg>"

@@ -226,7 +226,7 @@ def measures() -> Any:
     feet, stance = walk.feet[:, 0], walk.stance[:, 0]
     result |= {"postures": hexmj.stability_margin(feet, stance), "polygon": hexmj.support_polygon(feet[0], stance[0])}
     result |= {"range": hexmj.flss_over_range(hexmj.LDVS, 0.1, 0.5, n_starts=500)}
-    return result | {"gait": vars(hexmj.gaits.limit_gait(hexmj.HWS, 0.6, n_starts=3, periods=30))}
+    return result | {"gait": vars(hexmj.gaits.steady_state_gait(hexmj.HWS, 0.6, n_starts=3, periods=30))}
 
 
 def results() -> Any:

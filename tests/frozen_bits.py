@@ -43,9 +43,9 @@ def kinematic_flss(seed: int) -> Arrays:
 
 
 def gaits(seed: int) -> Arrays:
-    from hexmj.gaits import limit_gait
+    from hexmj.gaits import steady_state_gait
 
-    return vars(limit_gait(hexmj.HWS, 0.6, n_starts=5, seed=seed, stride=hexmj.Stride(dt=0.05), periods=30))
+    return vars(steady_state_gait(hexmj.HWS, 0.6, n_starts=5, seed=seed, stride=hexmj.Stride(dt=0.05), periods=30))
 
 
 def compared(seed: int, feedback: bool = False) -> Arrays:

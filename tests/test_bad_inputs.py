@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.gaits import gait, limit_gait
+from hexmj.gaits import gait, steady_state_gait
 from hexmj.phases import circular_mean, circular_range, wilson_phase
 from hexmj.walks import part_of
 
@@ -64,8 +64,8 @@ CASES: dict[str, tuple[str, Callable[[], Any]]] = {
             STARTS, hexmj.LDVS, 0.999, 10.0, stride=hexmj.Stride(dt=1.0), acceleration=hexmj.Acceleration(0.01, 0.05)
         ),
     ),
-    "gait at V = 0": ("velocity", lambda: limit_gait(hexmj.LDVS, 0.0)),
-    "gait of few periods": ("periods", lambda: limit_gait(hexmj.LDVS, 0.4, periods=3)),
+    "gait at V = 0": ("velocity", lambda: steady_state_gait(hexmj.LDVS, 0.0)),
+    "gait of few periods": ("periods", lambda: steady_state_gait(hexmj.LDVS, 0.4, periods=3)),
     "gait of one step": ("1 steps", lambda: gait(hexmj.walk(STARTS, hexmj.LDVS, 0.4, 0.1))),
     "no phases": ("phase", lambda: circular_mean([])),
     "phases in no rows": ("phase", lambda: circular_range([0.95, 0.05])),

@@ -11,7 +11,7 @@ from scipy.stats import circmean, circstd
 
 import hexmj.gaits
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
-from hexmj.gaits import CYCLES, STEPS, TOLERANCE, Gait, gait, limit_gait
+from hexmj.gaits import CYCLES, STEPS, TOLERANCE, Gait, gait, steady_state_gait
 from hexmj.legs import FIG1, MIRROR
 from hexmj.measures.kinematic import walk
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean, classify, unrolled, wilson_phase
@@ -249,7 +249,7 @@ def test_limit_gait_is_the_gait_of_the_whole_walk(controller, v, acceleration, m
     monkeypatch.setattr(hexmj.gaits, "PART", 700)
     stride, periods, n_starts = Stride(), CYCLES + 15, 40
     how = {"stride": stride, "acceleration": acceleration}
-    found = limit_gait(controller, v, n_starts=n_starts, seed=3, periods=periods, **how)
+    found = steady_state_gait(controller, v, n_starts=n_starts, seed=3, periods=periods, **how)
     time = periods * 30.0 * (1.0 + 1.0 / v) + (300.0 if acceleration else 0.0)
     assert_same_gait(found, gait(walk(draw_starts(n_starts, 3), controller, v, time, **how)))
     assert found.periodic.any()
@@ -260,7 +260,7 @@ def test_limit_gait_is_the_gait_of_the_whole_walk(controller, v, acceleration, m
 @pytest.mark.parametrize(("v", "phase", "printed"), few_of([(0.1, 0.655, 0.65), (0.4, 0.714, 0.7)], (0.4, 0.714, 0.7)))
 def test_hard_wired_phases(v, phase, printed):
     """An independent simulation gave 0.655 and 0.714 with the default constants; the paper prints 0.65 and 0.7."""
-    found = limit_gait(HWS, v, n_starts=10, acceleration=Acceleration(rate=0.0004), periods=45)
+    found = steady_state_gait(HWS, v, n_starts=10, acceleration=Acceleration(rate=0.0004), periods=45)
     assert found.periodic.all()
     assert found.stable.all()
     mean = circular_mean(found.phase, axis=0)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.diagrams import spans
-from hexmj.gaits import Gait, limit_gait
+from hexmj.walks import spans
+from hexmj.gaits import Gait, steady_state_gait
 from hexmj.legs import LEGS
 
 STARTS = hexmj.draw_starts(3, seed=1)
@@ -31,7 +31,7 @@ def walked() -> hexmj.PhysicalWalk:
 
 @pytest.fixture(scope="module")
 def found() -> Gait:
-    return limit_gait(hexmj.HWS, 0.6, n_starts=3, stride=hexmj.Stride(dt=0.05), periods=30)
+    return steady_state_gait(hexmj.HWS, 0.6, n_starts=3, stride=hexmj.Stride(dt=0.05), periods=30)
 
 
 def test_results_say_what_they_are_in_a_line(walked: hexmj.PhysicalWalk, found: Gait):

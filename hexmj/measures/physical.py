@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import advanced, begin, check_repeats, check_same
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
-from hexmj.diagrams import footfall_html
+from hexmj.walks import footfall_html
 from hexmj.measures.kinematic import first_loss
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, WalkSoFar
 from hexmj.physics.pushes import Push

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.diagrams import spans
+from hexmj.walks import spans
 from hexmj.legs import LEGS
 from hexmj.measures.tables import VELOCITY
 from hexmj.paper.measurements import NO_SET

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.controllers.planning import begin, planned_losses
 from hexmj.controllers.protocol import SteerableController
-from hexmj.gaits import limit_gait
+from hexmj.gaits import steady_state_gait
 from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
 from hexmj.phases import PAIRS
@@ -129,7 +129,7 @@ def limit_regimes(
     starts = draw_starts(n_starts, seed, stride)
     duration = observation_duration("walk", np.array(velocity), stride, acceleration)
     times = first_loss(starts, controller, velocity, duration, **how)
-    gait = limit_gait(controller, velocity, n_starts=n_starts, seed=seed, **how)
+    gait = steady_state_gait(controller, velocity, n_starts=n_starts, seed=seed, **how)
     return xr.Dataset(
         {
             "phase": (("start", "pair"), gait.phase, {"units": "1"}),

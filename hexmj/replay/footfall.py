@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.diagrams import spans
+from hexmj.walks import spans
 from hexmj.legs import LEGS
 from hexmj.plotting import MEASURE_STYLES, in_figure
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from hexmj.bodies.mjcf import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
-from hexmj.diagrams import footfall_html
+from hexmj.walks import footfall_html
 from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
 from hexmj.rendering.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
