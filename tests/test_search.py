@@ -12,8 +12,8 @@ import xarray as xr
 import hexmj
 from hexmj import Effort, FieldsForm, NetworkForm, Problem
 from hexmj.controllers.cruse1998 import MODEL_VARIANTS, Cruse1998
-from hexmj.controllers.cruse1998.presets import network_toml
-from hexmj.controllers.searched import searched_on
+from hexmj.controllers.cruse1998 import network_toml
+from hexmj.controllers.registry import searched_on
 from hexmj.errors import InputError
 from hexmj.search.forms import named_form
 from hexmj.search.problems import Sample

@@ -116,7 +116,6 @@ def _sliding(trials: list[Trial]) -> str:
             worst, (step, start, leg) = slides.max(), np.argwhere(slides == slides.max())[0]
             found = (
                 "feet that stand would slide: the tip of a foot that stays in place recedes at V_r, but one differs by"
-                f" {worst:.2g} V_p, in {place(walk, (step + 1, start, leg))}; a kinematic walk does not depend on it, in"
-                " physics the feet scrape"
+                f" {worst:.2g} V_p, in {place(walk, (step + 1, start, leg))}; in physical walks such feet scrape"
             )
     return found

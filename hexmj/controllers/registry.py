@@ -173,7 +173,7 @@ def _from_table(path: Path, name: str, values: dict[str, Any]) -> Controller:
 
 
 def _made(kind: type, usual: Any, values: dict[str, Any]) -> Any:
-    """Return a dataclass with values of a TOML table; the other fields are those of `usual`, or the class's defaults."""
+    """Return a dataclass with values of a TOML table; the others are those of `usual`, or the class's defaults."""
     names = [field.name for field in fields(kind) if field.init]
     if unknown := values.keys() - set(names):
         raise InputError(f"unknown field {min(unknown)}; valid names: {', '.join(names)}")

@@ -12,7 +12,7 @@ from hexmj.controllers.planning import begin, check_repeats
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.wrappers import LegLost
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
-from hexmj.gaits import limit_gait
+from hexmj.gaits import steady_state_gait
 from hexmj.measures.cells import UNITS
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.tables import happened, over_start
@@ -85,7 +85,7 @@ class EntrantWalks:
         """Return the steady-state gait of each start.
 
         Args:
-            periods: as of `gaits.limit_gait`.
+            periods: as of `gaits.steady_state_gait`.
             threads: by default one per core.
 
         Returns:
@@ -93,7 +93,7 @@ class EntrantWalks:
             without a gait, the `duty_factor` and the phases `ipsilateral` and `contralateral`, as circular means.
         """
         how = {"seed": self.seed, "stride": self.stride, "periods": periods, "threads": threads}
-        gait = limit_gait(self.entrant.controller, self.velocity, n_starts=self.n_starts, **how)
+        gait = steady_state_gait(self.entrant.controller, self.velocity, n_starts=self.n_starts, **how)
         columns = {
             "reached": gait.reached,
             "stable": gait.stable.astype(np.int8),

@@ -7,13 +7,13 @@ Each leg has a continuous-time neuron, whose potential is y_i and whose output i
 When its output rises through 1/2, the neuron lifts the leg. As in the source, neurons are connected to those of
 neighbouring legs, sense the position of their own leg, and have the same constants in every leg; an evolutionary search
 chooses the constants by walks from random starts. Unlike the source, a leg has one neuron and not five, since the swing
-is given; the weights along the body have a direction; and V_r is an input, since one network walks at every velocity. We
-know the source from the paper of 1998 and from code by others, not from its own paper.
+is given; the weights along the body have a direction; and V_r is an input, since one network walks at every velocity.
+We know the source from the paper of 1998 and from code by others, not from its own paper.
 
 Mapping: a leg's position is 0 at AEP_0 and 1 at PEP_0. Sensed: the own leg's position, and V_r. Fitted by us: all eight
-constants, on falls of our insect at V = 0.3 to 0.7 (`evolved.toml`, with the command), beginning with uncoupled legs. The
-result is a tripod with steps of 12 mm instead of 20 (at V = 0.5). At these velocities it falls less often than LDVS; in
-kinematic walks it loses stability more often than LDVS up to V = 0.3.
+constants, on falls of our insect at V = 0.3 to 0.7 (`evolved.toml`, with the command), beginning with uncoupled legs.
+The result is a tripod with steps of 12 mm instead of 20 (at V = 0.5). At these velocities it falls less often than
+LDVS; in kinematic walks it loses stability more often than LDVS up to V = 0.3.
 """
 
 from dataclasses import dataclass

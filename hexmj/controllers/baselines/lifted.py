@@ -1,8 +1,8 @@
 """Six legs that a rule lifts: the common part of all baselines, which differ only in when legs are lifted.
 
 A standing tip recedes at V_r and a swinging one moves ahead at V_p. A swing ends at AEP_0; it begins when the rule says
-so, and at PEP_min at the latest, beyond which no leg reaches. So V, V_p, AEP_0 and PEP_min mean the same as for the 1998
-network, and every baseline walks from the same random starts.
+so, and at PEP_min at the latest, beyond which no leg reaches. So V, V_p, AEP_0 and PEP_min mean the same as for the
+1998 network, and every baseline walks from the same random starts.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -26,8 +26,8 @@ class Legs:
     stands: np.ndarray
     """(start, leg) which legs stand."""
     load: np.ndarray
-    """(start, leg) share of the weight on each foot: equal on all standing feet in a kinematic walk, measured in a physical
-    one."""
+    """(start, leg) share of the weight on each foot: in a kinematic walk equal on all that stand, in a physical one
+    measured."""
     v: np.ndarray
     """(start, 1) V_r."""
     stride: Stride
@@ -49,7 +49,7 @@ class Legs:
 
 
 def check_numbers(rule: Any) -> None:
-    """Raise InputError if a float of a frozen dataclass is not finite, or a `Literal` invalid. Use as `__post_init__`."""
+    """Validate floats and `Literal`s of a frozen dataclass. Use as `__post_init__`."""
     hints = get_type_hints(type(rule))
     for name in (field.name for field in fields(rule)):
         if hints[name] is float:
@@ -214,7 +214,7 @@ def from_neighbour(table: tuple[tuple[int, ...], ...], values: np.ndarray) -> np
 
 
 def sum_of_legs(values: np.ndarray) -> np.ndarray:
-    """Return the sum over legs, (..., leg) to (...): each side by itself, so that mirrored starts give mirrored bits."""
+    """Return the sum over legs, (..., leg) to (...), side by side, so that mirrored starts give mirrored bits."""
     return (values[..., 0] + values[..., 1] + values[..., 2]) + (values[..., 3] + values[..., 4] + values[..., 5])
 
 

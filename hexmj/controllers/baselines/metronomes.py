@@ -4,9 +4,9 @@ Wilson's metachronal wave: on each side swings follow each other from hind to fr
 every velocity, so that each leg lags V / (1 + V) of a period behind the one behind it; the two sides move in
 anti-phase.  Graham's Gait I: the tripod at every velocity.
 
-Mapping: the period is (AEP_0 - PEP_0) (1 + 1/V), in which a swing goes from PEP_0 to AEP_0 at V_p. Fitted by us: nothing.
-Sensed: nothing, not even the start; the clock is at 0 when the walk begins, and a leg whose swing is due then is lifted
-at once. From `ideal_start` every leg is in phase with the clock.
+Mapping: the period is (AEP_0 - PEP_0) (1 + 1/V), in which a swing goes from PEP_0 to AEP_0 at V_p. Fitted by us:
+nothing. Sensed: nothing, not even the start; the clock is at 0 when the walk begins, and a leg whose swing is due then
+is lifted at once. From `ideal_start` every leg is in phase with the clock.
 """
 
 from dataclasses import dataclass

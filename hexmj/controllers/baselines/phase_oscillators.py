@@ -4,11 +4,11 @@ Source: flygym 1.2.1, examples/locomotion/cpg_controller.py (`calculate_ddt`) an
     d theta_i / dt = 2 pi nu + sum_j r_j w_ij sin(theta_j - theta_i - phi_ij)     (1)
     d r_i / dt = alpha (R - r_i)                                                  (2)
 
-Mapping: 1 / nu is one period (AEP_0 - PEP_0) (1 + 1/V) of a leg, and w and alpha keep their ratio to nu. The swing is the
-first V / (1 + V) of the phase, so that at the phase's own rate it lasts (AEP_0 - PEP_0) / V_p and a stance
-(AEP_0 - PEP_0) / V_r; a leg is lifted when its phase reaches the swing. In the source r is the size of the step too; here
-legs step the whole range, and r only scales the coupling. Fitted by us: nothing. Sensed: the tips at time 0, which set
-the phases (in the source they are drawn); nothing afterwards.
+Mapping: 1 / nu is one period (AEP_0 - PEP_0) (1 + 1/V) of a leg, and w and alpha keep their ratio to nu. The swing is
+the first V / (1 + V) of the phase, so that at the phase's own rate it lasts (AEP_0 - PEP_0) / V_p and a stance (AEP_0 -
+PEP_0) / V_r; a leg is lifted when its phase reaches the swing. In the source r is the size of the step too; here legs
+step the whole range, and r only scales the coupling. Fitted by us: nothing. Sensed: the tips at time 0, which set the
+phases (in the source they are drawn); nothing afterwards.
 """
 
 from dataclasses import dataclass

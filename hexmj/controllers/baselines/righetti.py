@@ -1,23 +1,22 @@
 """Hopf oscillators, one per leg, whose transitions depend on the load: Righetti & Ijspeert.
 
 Source: L. Righetti, A. J. Ijspeert, Pattern generators with sensory feedback for the control of quadruped locomotion,
-ICRA 2008, pp. 819-824. The paper was not available; equations and constants are those of a public re-implementation that
-cites it:
+ICRA 2008, pp. 819-824. The paper was not available; equations and constants are those of a public re-implementation
+that cites it:
     dx_i/dt = alpha (mu - r_i^2) x_i - omega_i y_i                                 (1)
     dy_i/dt = beta (mu - r_i^2) y_i + omega_i x_i + sum_j k_ij y_j + u_i           (2)
     omega_i = omega_stance / (exp(-b y_i) + 1) + omega_swing / (exp(b y_i) + 1)    (3)
     u_i = -omega_i x_i - sum_j k_ij y_j  stops a transition, -sign(y_i) F hastens one, else 0    (4)
-A leg stands while y > 0 and x falls, and swings while y < 0. That code has no load; that Eq. 4 stops the end of a stance
-while the foot is loaded, and hastens transitions otherwise, is from memory.
+A leg stands while y > 0 and x falls, and swings while y < 0. That code has no load; that Eq. 4 stops the end of a
+stance while the foot is loaded, and hastens transitions otherwise, is from memory.
 
-Mapping: omega_stance = pi V_r / (AEP_0 - PEP_0) and omega_swing = pi V_p / (AEP_0 - PEP_0); x at time 0 is where
-the tip is between PEP_0 and AEP_0; a leg is lifted when y becomes negative. Ours, since the source is about quadrupeds
-and its thresholds of load were not found: a period lasts 1 s of the source's time; all legs are coupled, k_ij = 1 within a
-tripod and -1 between the two, after the source's trot; a leg at the end of its stance waits while it carries more
-than a quarter of the weight, between a sixth and a third, which are equal parts of six legs and of three, and at the
-end of its swing while its foot carries nothing; a transition is hastened in the second half of a stance when a foot
-carries nothing, and of a swing when it carries anything.  Fitted to a measure: nothing.  Sensed: the load on each
-foot.
+Mapping: omega_stance = pi V_r / (AEP_0 - PEP_0) and omega_swing = pi V_p / (AEP_0 - PEP_0); x at time 0 is where the
+tip is between PEP_0 and AEP_0; a leg is lifted when y becomes negative. Ours, since the source is about quadrupeds and
+its thresholds of load were not found: a period lasts 1 s of the source's time; all legs are coupled, k_ij = 1 within a
+tripod and -1 between the two, after the source's trot; a leg at the end of its stance waits while it carries more than
+a quarter of the weight, between a sixth and a third, which are equal parts of six legs and of three, and at the end of
+its swing while its foot carries nothing; a transition is hastened in the second half of a stance when a foot carries
+nothing, and of a swing when it carries anything.  Fitted to a measure: nothing.  Sensed: the load on each foot.
 
 Periods come out 6 to 19 % shorter than a single leg's.
 """

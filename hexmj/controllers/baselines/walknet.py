@@ -46,7 +46,7 @@ class Links:
     """From the contralateral leg."""
 
     def shift(self, sent: np.ndarray) -> np.ndarray:
-        """Return the shift that each leg receives, (start, leg) [step lengths], from `sent`, (start, leg), at most 1."""
+        """Return each leg's shift, (start, leg) [step lengths], by `sent`, (start, leg), at most 1."""
         behind, ahead, across = (np.array(2 * values) for values in (self.behind, self.ahead, self.across))
         return sent[:, BEHIND] * behind + sent[:, AHEAD] * ahead + sent[:, MIRROR] * across
 
@@ -250,5 +250,5 @@ class Walknet(Lifted):
 
 
 def _within(legs: Legs, begin: np.ndarray, length: float) -> np.ndarray:
-    """Return which legs stand within a stretch of the stance, by its begin behind AEP_0 and its length, (start, leg)."""
+    """Return which legs stand in a stretch of the stance, by its begin behind AEP_0 and length, (start, leg)."""
     return legs.stands & (legs.travel > begin) & (legs.travel < begin + length)

@@ -118,8 +118,8 @@ class _Presets(Mapping[str, Cruse1998]):
 
 
 PRESETS: Mapping[str, Cruse1998] = _Presets()
-"""The paper's weight sets, no coordination, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1 to
-0.5 at once; `robust-0.1`, `robust-0.3` and `robust-0.7`, good over all `hexmj.variants`; and `lasting-0.1` ...
+"""The paper's weight sets, no coordination, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1
+to 0.5 at once; `robust-0.1`, `robust-0.3` and `robust-0.7`, good over all `hexmj.variants`; and `lasting-0.1` ...
 `lasting-0.9` and `lasting`, which were searched under that model variant and use it."""
 
 
