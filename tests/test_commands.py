@@ -20,7 +20,7 @@ from hexmj.cli.command import StudyCommand, imported
 from hexmj.cli.main import COMMANDS, GROUPS, command
 from hexmj.cli.options import NAMES
 from hexmj.cli.output import difference, four_digits, interval, tables_that_fit
-from hexmj.controllers.cruse1998.presets import network_toml
+from hexmj.controllers.cruse1998 import network_toml
 
 STUDIES = [name for name in COMMANDS if isinstance(command(name), StudyCommand)]
 SHORT = ["--velocity", 0.4, "--starts", 2, "--observation-time", 3]

@@ -18,7 +18,7 @@ from hexmj.errors import InputError, Refused
 from hexmj.legs import LEGS
 from hexmj.stability import walk_margin
 from hexmj.starts import checked_starts, checked_velocities
-from hexmj.threads import check_memory
+from hexmj.threads import check_memory, thread_count
 from hexmj.timing import Acceleration, Stride, check_reached
 from hexmj.validate import short
 from hexmj.walks import PLANNED, PlannedWalk, copied
@@ -50,6 +50,7 @@ def begin(
         InputError: a start, velocity or plan is out of range; `Refused` if the controller refuses.
     """
     check_controller_type(controller)
+    thread_count(threads)
     x = checked_starts(starts, stride)
     v = checked_velocities(velocity, len(x), acceleration)
     check_reached(v, stride, acceleration)

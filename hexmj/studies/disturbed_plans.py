@@ -19,7 +19,7 @@ from hexmj.controllers.protocol import (
     check_steerable,
 )
 from hexmj.errors import InputError
-from hexmj.gaits import limit_gait
+from hexmj.gaits import steady_state_gait
 from hexmj.stability import stability_margin, walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride
@@ -105,7 +105,7 @@ def collect_postures(controller: Controller, velocity: float, seed: int, stride:
     Raises:
         InputError: no start reaches a stable periodic gait.
     """
-    gait = limit_gait(controller, velocity, n_starts=CANDIDATES, seed=seed, stride=stride)
+    gait = steady_state_gait(controller, velocity, n_starts=CANDIDATES, seed=seed, stride=stride)
     stable = gait.periodic & gait.stable
     if not stable.any():
         raise InputError(
