@@ -1,4 +1,4 @@
-"""Run the notebooks anew and store what they show: `python notebooks/run.py`."""
+"""Run the notebooks and store their output: `python notebooks/run.py`."""
 
 from argparse import ArgumentParser
 from pathlib import Path
@@ -11,15 +11,15 @@ FOLDER = Path(__file__).parent
 LIMIT = 120
 """Time for a cell [s]."""
 
-QUIETLY = ["--log-level=ERROR"]
-"""For a kernel, which would warn that it is spoken to without encryption, by this machine alone."""
+QUIET = ["--log-level=ERROR"]
+"""Arguments of a kernel, which otherwise warns about its unencrypted local connection."""
 
 
 def executed(path: Path) -> Any:
-    """A notebook with what its cells show, without the times at which they ran."""
+    """Return a notebook with the output of its cells, without times."""
     book = nbformat.read(path, as_version=4)
-    place = {"metadata": {"path": str(FOLDER)}}
-    NotebookClient(book, timeout=LIMIT, record_timing=False, resources=place, extra_arguments=QUIETLY).execute()
+    resources = {"metadata": {"path": str(FOLDER)}}
+    NotebookClient(book, timeout=LIMIT, record_timing=False, resources=resources, extra_arguments=QUIET).execute()
     for cell in book.cells:
         cell.metadata.pop("execution", None)
     book.metadata.language_info = {"name": "python"}
