@@ -14,9 +14,9 @@ from drawing import drawing
 from episodes import KINDS, ZEROS, episode, run_steps
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import HWS, LDVS
 from hexmj.controllers.feedback import SensoryFeedback
+from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.environments import dm
 from hexmj.errors import InputError, SimulationError
