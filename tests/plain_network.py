@@ -7,8 +7,7 @@ and knows nothing of lanes and blocks; the compiled network must agree with it t
 from dataclasses import dataclass
 from math import inf
 
-from hexmj.controllers.cruse1998 import Order, Weights
-from hexmj.controllers.cruse1998 import ModelVariant
+from hexmj.controllers.cruse1998 import ModelVariant, Order, Weights
 from hexmj.legs import N1, N2, N3, N4
 from hexmj.timing import Acceleration, Stride
 

@@ -32,7 +32,7 @@ def test_the_network_conforms(name, order):
     assert controller.mirrored == (order != "sequential" and name != "own-0.1")
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_other_controllers_conform():
     check_controller(hexmj.SensoryFeedback(LDVS))
     check_controller(replace(LDVS, name="fine"), hexmj.Stride(dt=0.05, geometry=hexmj.CENTRED))

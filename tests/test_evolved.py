@@ -62,7 +62,7 @@ def test_the_search_begins_with_legs_that_step_by_themselves():
     assert np.array_equal(np.delete(hexmj.walk(moved, Evolved(), 0.3, 300.0).x, L2, 2), np.delete(walk.x, L2, 2))
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_what_was_found_falls_as_rarely_from_fresh_starts_as_is_written():
     found = read_toml(FOUND)
     search: Any = command("search")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS
+from hexmj.controllers.planning import begin
 from hexmj.errors import InputError, SimulationError, StillThrown
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics import divergence

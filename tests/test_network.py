@@ -80,7 +80,7 @@ def test_equals_plain_network_to_the_last_bit(seed, size, threads, rules, geomet
         assert lost[i] == ((unstable[0] + 1) * stride.dt if unstable else np.inf)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("order", get_args(Order))
 def test_every_model_variant_equals_the_plain_network(order):
     """All 48 combinations of choices: each is compiled by itself."""

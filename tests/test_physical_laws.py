@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
+from hexmj.controllers.planning import begin
 from hexmj.legs import MIRROR
 from hexmj.measures.compare import physical_flss
 from hexmj.measures.kinematic import walk
@@ -94,7 +94,7 @@ def test_mirrored_starts_walk_mirrored_paths():
     assert np.array_equal(one.measured.stance, other.measured.stance[..., mirror])
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_physical_flss_at_a_quarter_of_the_time_step_stays_within_its_interval():
     """`test_physics` has the half of it, over the observation time `walk`."""
     conditions = (Conditions(longest_substep=ms) for ms in (0.625, 0.15625))

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
 from hexmj.controllers.feedback import SensoryFeedback
+from hexmj.controllers.planning import begin
 from hexmj.errors import InputError, SimulationError
 from hexmj.measures.compare import compare, physical_flss
 from hexmj.measures.kinematic import walk
@@ -156,7 +156,7 @@ def test_mujocos_clock_stops_only_while_a_batch_steps(own):
         mujoco.set_mjcb_time(None)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_speed_keeps_to_the_command(hundred):
     """0.95 to 1.05 of the commanded speed over the observation time `walk` where the start did not fall."""
     slow = compare(LDVS, [0.3], n_starts=40)
@@ -165,7 +165,7 @@ def test_speed_keeps_to_the_command(hundred):
     assert ((speed > 0.95) & (speed < 1.05)).all()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_slow_walks_tend_to_the_static_criterion():
     """At V_p = 20 mm/s both FLSS differ by at most 0.06, and both answers agree for at least 0.88 of the starts."""
     result = compare(LDVS, [0.5], n_starts=100, conditions=Conditions(vp=20.0))
@@ -347,7 +347,7 @@ def test_feet_grasp_while_the_plan_lets_them_stand():
     assert not stance.all()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_halving_the_physics_step_hardly_changes_physical_flss(hundred):
     """Measured with 200 starts at V = 0.3, 0.5, 0.7: 0.155, 0.365, 0.690 became 0.160, 0.365, 0.695."""
     assert Conditions().longest_substep == 0.625

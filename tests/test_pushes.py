@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS, UNCOORDINATED
+from hexmj.controllers.planning import begin
 from hexmj.errors import InputError
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.outcomes import Outcomes

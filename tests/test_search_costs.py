@@ -47,7 +47,7 @@ def test_costs_do_not_depend_on_threads_or_on_the_other_candidates():
     assert [sample.costs(vector[None])[0] for vector in vectors] == costs.tolist()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("feedback", [False, True])
 def test_the_physical_cost_is_the_physical_flss(feedback):
     conditions = hexmj.Conditions(vp=200.0)

@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.feedback import SensoryFeedback
+from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.environments import dm
 from hexmj.environments.dm import InsectPhysics

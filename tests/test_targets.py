@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj.bodies.kinematics import standing_tips
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import begin
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
+from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk

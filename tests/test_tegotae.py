@@ -40,7 +40,7 @@ def test_six_legs_that_carry_equal_parts_go_at_their_own_rate() -> None:
     assert np.allclose(rates(0.9, [1 / 6] * 6), 1)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_tripod_comes_of_the_load_alone() -> None:
     stride, starts = Stride(), hexmj.draw_starts(6, 2)
     found = gait(walk(starts, BASELINES["tegotae"], 0.5, 25 * stride.periods(0.5)))

@@ -1,4 +1,4 @@
-"""Which cases of a test `.ci/run` has time for."""
+"""Parameters that only the slow tests need."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -7,8 +7,8 @@ import pytest
 
 
 def few_of(cases: Iterable[Any], *few: Any) -> list[Any]:
-    """All cases, in their order; those besides the few are tried by `make thorough` alone."""
-    rare = pytest.mark.thorough
+    """Return all cases in order; those not among the few are marked `slow`."""
     return [
-        one if one in few else pytest.param(*(one if isinstance(one, tuple) else (one,)), marks=rare) for one in cases
+        case if case in few else pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.slow)
+        for case in cases
     ]
