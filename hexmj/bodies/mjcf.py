@@ -174,7 +174,7 @@ def _compiled(conditions: Conditions, looks: bool, pushes: bool, mjcf: bytes) ->
     feet = [model.site(foot).id for foot in body.feet]
     model.site_type[feet], radius = mujoco.mjtGeom.mjGEOM_SPHERE, model.geom(body.feet[0]).size[0]
     model.site_size[feet, 0] = radius + radius / 10  # a touch sensor sees only contacts within its site
-    check_finished(model, conditions)
+    check_finished(model, body)
     if conditions.leg_mass != 1.0 or conditions.centre_of_mass != 0.0:
         _redistribute(model, conditions)
     return CompiledBody.of(model, conditions)

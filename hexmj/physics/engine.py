@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Lock
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
@@ -60,13 +60,8 @@ class Rolled:
     """(n, step, state) after each step; `Engine.put` takes it."""
 
 
-class Replayed(NamedTuple):
-    """What is needed to replay some bodies from a moment on."""
-
-    states: np.ndarray
-    """(n, state)."""
-    push: np.ndarray
-    """(n,) force on the root to the left [g mm/s^2]."""
+Replayed = tuple[np.ndarray, np.ndarray]
+"""What is needed to replay some bodies: states, (n, state), and the push on the root to the left, (n,) [g mm/s^2]."""
 
 
 class Engine(Protocol):
@@ -141,7 +136,7 @@ class MujocoBatch:
 
     def states(self, ids: np.ndarray) -> np.ndarray:
         """The states of some bodies, (n, state); `put` takes them."""
-        return _side_by_side(ids, tuple(self._state))
+        return np.concatenate([values[ids] for values in self._state], axis=1)
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
         """See `Engine.put`."""
@@ -197,18 +192,19 @@ class MujocoBatch:
                 self._timestep[ids], self._contact[ids] = model.opt.timestep, model.pair_solref
         feet = [sensors[:, :, self._foot] for sensors in (seen["sensordata"], self.sensors[ids, None])]
         places = np.concatenate(feet, axis=1).reshape(len(ids), 1 + control.shape[1], 6, 3)
-        torque = _acting(before.states, seen[STATE_BITS], seen["actuator_force"], *self._joints)
-        return Rolled(before.states, places, seen["sensordata"], seen["actuator_force"], torque, seen[STATE_BITS])
+        torque = _acting(before[0], seen[STATE_BITS], seen["actuator_force"], *self._joints)
+        return Rolled(before[0], places, seen["sensordata"], seen["actuator_force"], torque, seen[STATE_BITS])
 
     def replayed(self, ids: np.ndarray) -> Replayed:
         """Copy what is needed to replay some bodies, since MuJoCo resets a body that diverges."""
-        return Replayed(self.states(ids), self.push[ids])
+        return self.states(ids), self.push[ids]
 
     def saved(self, before: Replayed, i: int, start: int, control: np.ndarray) -> dict[str, np.ndarray]:
         """The i-th body of `before`: its state, push, controls, (step, actuator), time step and contacts."""
         model, applied = self._batch.get_model(start), np.zeros((self._model.nbody, 6))
-        applied[self._root, 1] = before.push[i]
-        state = dict(zip(STATE, np.split(before.states[i], self._ends), strict=True))
+        states, push = before
+        applied[self._root, 1] = push[i]
+        state = dict(zip(STATE, np.split(states[i], self._ends), strict=True))
         settings = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep)}
         return state | {"xfrc_applied": applied} | settings | {"ctrl": control}
 
@@ -282,21 +278,6 @@ def stepping() -> Iterator[None]:
             if not _users:
                 mujoco.set_mjcb_time(clock)
                 mujoco.set_mju_user_warning(warning)
-
-
-@jitted
-def _side_by_side(ids: Any, values: Any) -> Any:
-    """Rows of some arrays, each (start, number), side by side, (n, number)."""
-    columns = 0
-    for array in values:
-        columns += array.shape[1]
-    rows, at = np.empty((len(ids), columns)), 0
-    for array in values:
-        for i, n in enumerate(ids):
-            for j in range(array.shape[1]):
-                rows[i, at + j] = array[n, j]
-        at += array.shape[1]
-    return rows
 
 
 @jitted
