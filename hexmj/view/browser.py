@@ -207,16 +207,10 @@ class BrowserView:
 
     def _add_marks(self, marks: Any) -> None:
         scene, fan = self.server.scene, np.array([(0, i, i + 1) for i in range(1, 5)])
-        self._polygons = [
-            scene.add_mesh_simple(f"/polygon_{name}", np.zeros((6, 3)), fan, color=colour, opacity=opacity,
-                                  wireframe=wireframe, side="double", cast_shadow=False)
-            for name, colour, opacity, wireframe in (("stable", STABLE, 0.45, False), ("lost", UNSTABLE, 1.0, True))
-        ]  # fmt: skip
-        segments = np.zeros((6, 2, 3))
-        self._outlines = [
-            scene.add_line_segments(f"/outline_{name}", segments, colour, thickness=2 * marks.outline)
-            for name, colour in (("stable", STABLE), ("lost", UNSTABLE))
-        ]
+        self._polygon = scene.add_mesh_simple(
+            "/polygon", np.zeros((6, 3)), fan, color=STABLE, opacity=0.45, side="double", cast_shadow=False
+        )
+        self._outline = scene.add_line_segments("/outline", np.zeros((6, 2, 3)), STABLE, thickness=2 * marks.outline)
         self._plumb = scene.add_line_segments("/plumb", np.zeros((1, 2, 3)), CENTRE, thickness=marks.outline)
         self._centre = scene.add_icosphere("/centre", marks.centre[0], CENTRE)
         sphere: Any = {"subdivisions": 1, "cast_shadow": False}
@@ -238,10 +232,10 @@ class BrowserView:
         corners = np.column_stack([polygon, np.full(len(polygon), level + 0.3)]) - origin
         padded = corners[np.minimum(np.arange(6), len(corners) - 1)] if len(corners) else np.zeros((6, 3))
         edges = np.stack([padded, np.roll(padded, -1, axis=0)], axis=1)
-        stable = moment.margin > 0
-        for shown, fill, outline in zip((stable, not stable), self._polygons, self._outlines, strict=True):
-            fill.visible = outline.visible = shown
-            fill.vertices, outline.points = padded.astype(np.float32), edges.astype(np.float32)
+        self._polygon.visible = stable = moment.margin > 0
+        self._polygon.vertices, self._outline.points = padded.astype(np.float32), edges.astype(np.float32)
+        colours = np.tile(STABLE if stable else UNSTABLE, (6, 2, 1))
+        self._outline.colors = (255 * colours).astype(np.uint8)
         foot = np.array([0.0, 0.0, level])
         self._plumb.points = np.stack([centre - origin, foot])[np.newaxis].astype(np.float32)
         self._centre.position = foot
