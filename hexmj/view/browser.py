@@ -210,7 +210,11 @@ class BrowserView:
         self._polygon = scene.add_mesh_simple(
             "/polygon", np.zeros((6, 3)), fan, color=STABLE, opacity=0.45, side="double", cast_shadow=False
         )
-        self._outline = scene.add_line_segments("/outline", np.zeros((6, 2, 3)), STABLE, thickness=2 * marks.outline)
+        segments, colours = np.zeros((6, 2, 3)), {True: STABLE, False: UNSTABLE}
+        self._outlines = {
+            stable: scene.add_line_segments(f"/outline_{stable}", segments, colour, thickness=2 * marks.outline)
+            for stable, colour in colours.items()
+        }
         self._plumb = scene.add_line_segments("/plumb", np.zeros((1, 2, 3)), CENTRE, thickness=marks.outline)
         self._centre = scene.add_icosphere("/centre", marks.centre[0], CENTRE)
         sphere: Any = {"subdivisions": 1, "cast_shadow": False}
@@ -232,10 +236,10 @@ class BrowserView:
         corners = np.column_stack([polygon, np.full(len(polygon), level + 0.3)]) - origin
         padded = corners[np.minimum(np.arange(6), len(corners) - 1)] if len(corners) else np.zeros((6, 3))
         edges = np.stack([padded, np.roll(padded, -1, axis=0)], axis=1)
-        self._polygon.visible = stable = moment.margin > 0
-        self._polygon.vertices, self._outline.points = padded.astype(np.float32), edges.astype(np.float32)
-        colours = np.tile(STABLE if stable else UNSTABLE, (6, 2, 1))
-        self._outline.colors = (255 * colours).astype(np.uint8)
+        self._polygon.visible = moment.margin > 0
+        self._polygon.vertices = padded.astype(np.float32)
+        for stable, outline in self._outlines.items():
+            outline.visible, outline.points = stable == (moment.margin > 0), edges.astype(np.float32)
         foot = np.array([0.0, 0.0, level])
         self._plumb.points = np.stack([centre - origin, foot])[np.newaxis].astype(np.float32)
         self._centre.position = foot
