@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hexmj.walks import spans
 from hexmj.legs import LEGS
 from hexmj.plotting import MEASURE_STYLES, in_figure
+from hexmj.walks import spans
 
 if TYPE_CHECKING:
     import xarray as xr

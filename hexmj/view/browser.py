@@ -16,7 +16,6 @@ import numpy as np
 
 from hexmj.bodies.mjcf import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
-from hexmj.walks import footfall_html
 from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
 from hexmj.rendering.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
@@ -25,6 +24,7 @@ from hexmj.replay.take import margin_in_words, support_on_ground
 from hexmj.validate import whole
 from hexmj.view.live import LiveWalk, Moment
 from hexmj.view.session import IMPULSE, LiveSession, ticks
+from hexmj.walks import footfall_html
 
 CHART_INTERVAL = 6
 """Frames between two drawings of the charts."""
