@@ -13,13 +13,14 @@ servo. `docs/feedback.md` describes the alternatives that were tried.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from hexmj.controllers.planning import check_velocities, first_losses
-from hexmj.controllers.protocol import Controller, FeedbackPlan, Sensed, SteerablePlan, check_controller_type
+from hexmj.controllers.planning import first_losses
+from hexmj.controllers.protocol import FeedbackPlan, Sensed, SteerablePlan
+from hexmj.controllers.wrappers import WrappedPlan, Wrapper
 from hexmj.errors import InputError
-from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, copied, joined
 
 SAME = 1e-9
@@ -27,14 +28,8 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True)
-class SensoryFeedback:
+class SensoryFeedback(Wrapper):
     """A controller with sensory feedback, made from a steerable one."""
-
-    controller: Controller
-    """Plans the steps."""
-
-    def __post_init__(self) -> None:
-        check_controller_type(self.controller)
 
     @property
     def name(self) -> str:
@@ -46,24 +41,8 @@ class SensoryFeedback:
         """As the controller that plans."""
         return getattr(self.controller, "mirrored", False)
 
-    def check_velocity(self, velocity: float, stride: Stride) -> None:
-        """As the controller that plans."""
-        check_velocities(self.controller, [velocity], stride)
-
-    def begin(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> "SensedPlan":
-        """See `protocol.Controller.begin`.
-
-        Raises:
-            InputError: the controller's plans have feedback already, or cannot be steered.
-        """
-        plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
+    def wrap(self, plan: Any) -> "SensedPlan":
+        """See `Wrapper`; the plan has no feedback of its own, and can be steered."""
         if isinstance(plan, FeedbackPlan) or not isinstance(plan, SteerablePlan):
             raise InputError(
                 f"feedback around {self.controller.name}; expected a controller without feedback of its own whose plans"
@@ -72,7 +51,7 @@ class SensoryFeedback:
         return SensedPlan(plan)
 
 
-class SensedPlan:
+class SensedPlan(WrappedPlan):
     """A `protocol.FeedbackPlan` that continues from the sensed tips and contacts, with targets that load the servos.
 
     What is not sensed is taken to be as planned, so that without `sense` the walk is the kinematic one.
@@ -80,13 +59,12 @@ class SensedPlan:
 
     def __init__(self, plan: SteerablePlan) -> None:
         """Wrap a plan at time 0; other legs may have been given to it before."""
-        self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
-        self._plan, self.made_for = plan, getattr(plan, "made_for", None)
+        super().__init__(plan)
         self._tips = self._targets = self._ordered = np.array(plan.tips)
         self._stance = np.array(plan.standing)
 
     def first_losses(self, steps: np.ndarray) -> np.ndarray:
-        """See `protocol.FastLosses`: in a kinematic walk, those of the plan within."""
+        """See `protocol.Plan`: in a kinematic walk, those of the plan within."""
         return first_losses(self._plan, steps)
 
     def sense(self, sensed: Sensed) -> None:

@@ -19,7 +19,6 @@ from hexmj.controllers.planning import (
 )
 from hexmj.controllers.protocol import (
     Controller,
-    FastLosses,
     FeedbackPlan,
     Plan,
     Sensed,
@@ -194,7 +193,8 @@ def _batch(trial: Trial) -> None:
 
 
 def _fast_losses(trial: Trial) -> None:
-    if isinstance(plan := trial.begin(), FastLosses):
+    plan: Any = trial.begin()
+    if hasattr(plan, "first_losses"):
         steps = STEPS * (len(trial.starts) - np.arange(len(trial.starts))) // len(trial.starts)
         fast, planned = plan.first_losses(steps.copy()), planned_losses(trial.begin(), steps)
         if not np.array_equal(fast, planned):

@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike
 
 from hexmj.controllers.protocol import (
     Controller,
-    FastLosses,
-    KnowsItsLimits,
     Plan,
     SteerableController,
     SteerablePlan,
@@ -87,13 +85,14 @@ def begin_at_speed(
 def check_velocities(
     controller: Controller, velocities: Iterable[float], stride: Stride, acceleration: Acceleration | None = None
 ) -> None:
-    """Raise InputError if a controller refuses one of some V_r with this time step, see `protocol.KnowsItsLimits`.
+    """Raise InputError if a controller refuses one of some V_r with this time step (its `check_velocity`).
 
     Walks that accelerate are refused later, if they reach such a V_r.
     """
-    if isinstance(controller, KnowsItsLimits) and not acceleration:
+    check = getattr(controller, "check_velocity", None)
+    if check and not acceleration:
         for velocity in velocities:
-            controller.check_velocity(velocity, stride)
+            check(velocity, stride)
 
 
 def check_plan(plan: Plan, starts: np.ndarray, stride: Stride) -> None:
@@ -181,8 +180,9 @@ def first_losses(plan: Plan, steps: int | np.ndarray, threads: int | None = None
         steps: how far to look, (start,), or one number for all.
         threads: by default one per core; the result does not depend on it.
     """
-    if isinstance(plan, FastLosses):
-        return plan.first_losses(np.broadcast_to(steps, len(plan.starts)).copy())
+    fast = getattr(plan, "first_losses", None)
+    if fast:
+        return fast(np.broadcast_to(steps, len(plan.starts)).copy())
     return planned_losses(plan, steps, threads)
 
 

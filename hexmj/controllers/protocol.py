@@ -22,7 +22,8 @@ class Plan(Protocol):
     """A walk of many independent starts, planned as far as it was advanced.
 
     A plan that lifts the feet itself may have an attribute `made_for`, the `Conditions` it fits; physical walks under
-    other conditions are then refused. A plan may have a method `first_losses`, see `FastLosses`.
+    other conditions are then refused. A plan may have a method `first_losses(steps)`, called once at time 0: a faster
+    way to the result of `planning.planned_losses`.
     """
 
     @property
@@ -120,32 +121,12 @@ class SteerablePlan(Plan, Protocol):
 
 
 @runtime_checkable
-class KnowsItsLimits(Protocol):
-    """A controller that can refuse a velocity with a time step before any work."""
-
-    def check_velocity(self, velocity: float, stride: Stride) -> None:
-        """Raise InputError if the stride's time step is too long for V_r, a fraction of V_p."""
-        ...
-
-
-@runtime_checkable
-class FastLosses(Plan, Protocol):
-    """A plan that finds its first losses of static stability faster than by being advanced."""
-
-    def first_losses(self, steps: np.ndarray) -> np.ndarray:
-        """Return the first of each start's `steps`, (start,), that is statically unstable, from 1; 0 where none is.
-
-        Called at time 0; the call consumes the plan. The result equals that of `planning.planned_losses`.
-        """
-        ...
-
-
-@runtime_checkable
 class Controller(Protocol):
     """A frozen dataclass whose fields are its settings: plain data that distinguish two controllers.
 
-    A controller with the attribute `mirrored = True` states that starts mirrored in the body axis give mirrored walks
-    to the last bit; `conformance` checks it.
+    With an attribute `mirrored = True` it states that starts mirrored in the body axis give mirrored walks to the last
+    bit; `conformance` checks it. A method `check_velocity(velocity, stride)` may raise InputError before any work if
+    the time step is too long for V_r.
     """
 
     @property

@@ -177,25 +177,11 @@ class Lifted:
     reads_load = False
     """Whether the rule uses the load."""
 
-    def begin(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> LiftedPlan:
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> LiftedPlan:
         """See `protocol.Controller.begin`."""
         return self._plan(starts, velocity, stride, acceleration)
 
-    def begin_at_speed(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> LiftedPlan:
+    def begin_at_speed(self, starts, velocity, stride, acceleration=None, threads=None) -> LiftedPlan:
         """See `protocol.SteerableController.begin_at_speed`."""
         return self._plan(starts, velocity, stride, acceleration, AT_SPEED)
 

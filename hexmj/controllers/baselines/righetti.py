@@ -75,7 +75,7 @@ class Righetti(Lifted):
     mirrored = True
 
     def check_velocity(self, velocity: float, stride: Stride) -> None:
-        """See `protocol.KnowsItsLimits`: a time step that is too long shows within `TRIED` steps of a few starts.
+        """See `protocol.Controller`: a time step that is too long shows within `TRIED` steps of a few starts.
 
         Raises:
             Refused: the oscillators diverge, even if the walk itself is shorter.

@@ -194,7 +194,7 @@ class Cruse1998:
 
 @dataclass(eq=False)
 class NetworkPlan:
-    """A `protocol.SteerablePlan` with `FastLosses`: the network of many starts, advanced as far as asked for."""
+    """A `protocol.SteerablePlan`: the network of many starts, advanced as far as asked for."""
 
     starts: np.ndarray
     """(start, leg) tips at time 0 [mm]."""
@@ -239,7 +239,7 @@ class NetworkPlan:
         return PlannedWalk(time, velocity, x, y, stance, geometry, aep=aep, height=height)
 
     def first_losses(self, steps: np.ndarray) -> np.ndarray:
-        """See `protocol.FastLosses`; only the present state of each walk is kept in memory."""
+        """See `protocol.Plan`; only the present state of each walk is kept in memory."""
         if "_blocks" in vars(self):
             return planned_losses(self, steps, self.threads)
         lost, size = np.empty(len(steps), dtype=int), len(steps)

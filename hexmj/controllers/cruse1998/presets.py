@@ -1,7 +1,6 @@
 """Networks by name: the paper's weight sets and our own, and parameter files (TOML)."""
 
 import math
-from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields
 from functools import cache
 from pathlib import Path
@@ -91,46 +90,28 @@ def _numbers(name: str, table: Any, valid: list[str]) -> dict[str, float]:
     return {key: float(value) for key, value in table.items()}
 
 
-_PAPER = {
-    name: Cruse1998(weights, name=name)
-    for name, weights in (("hws", HWS_WEIGHTS), ("ldvs", LDVS_WEIGHTS), ("uncoordinated", NO_WEIGHTS))
-}
-
-HWS, LDVS, UNCOORDINATED = _PAPER.values()
-"""The paper's hard-wired and linearly velocity-dependent systems, and no coordination (Section 5.1)."""
-
-
-class _Presets(Mapping[str, Cruse1998]):
-    """Weight sets by name; the file of our own sets is read when one of them is used, not by every command."""
-
-    def __getitem__(self, name: str) -> Cruse1998:
-        return _PAPER[name] if name in _PAPER else _own()[name]
-
-    def __iter__(self) -> Iterator[str]:
-        yield from _PAPER
-        yield from _own()
-
-    def __len__(self) -> int:
-        return len(_PAPER) + len(_own())
-
-    def __repr__(self) -> str:
-        return repr(dict(self))
-
-
-PRESETS: Mapping[str, Cruse1998] = _Presets()
-"""The paper's weight sets, no coordination, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1
-to 0.5 at once; `robust-0.1`, `robust-0.3` and `robust-0.7`, good over all `hexmj.variants`; and `lasting-0.1` ...
-`lasting-0.9` and `lasting`, which were searched under that model variant and use it."""
-
-
-@cache
-def _own() -> dict[str, Cruse1998]:
-    origin = {"command", SEARCHED}
-    tables = {name: {key: table[key] for key in table.keys() - origin} for name, table in own_tables().items()}
-    return {name: read_network(table, f"{OWN.name} [{name}]", name) for name, table in tables.items()}
-
-
 @cache
 def own_tables() -> dict[str, Any]:
     """Return the table of each of our own sets: its command, the starts on which it was searched, and its weights."""
     return read_toml(OWN)
+
+
+def _own(name: str, table: dict[str, Any]) -> Cruse1998:
+    weights = {key: value for key, value in table.items() if key not in ("command", SEARCHED)}
+    return read_network(weights, f"{OWN.name} [{name}]", name)
+
+
+HWS = Cruse1998(HWS_WEIGHTS, name="hws")
+"""The paper's hard-wired system."""
+
+LDVS = Cruse1998(LDVS_WEIGHTS, name="ldvs")
+"""The paper's linearly velocity-dependent system."""
+
+UNCOORDINATED = Cruse1998(NO_WEIGHTS, name="uncoordinated")
+"""No coordination (Section 5.1)."""
+
+PRESETS: dict[str, Cruse1998] = {network.name: network for network in (HWS, LDVS, UNCOORDINATED)}
+PRESETS |= {name: _own(name, table) for name, table in own_tables().items()}
+"""The paper's weight sets, no coordination, and our own: `own-0.1` ... `own-0.9` for one velocity each, `own` for 0.1
+to 0.5 at once; `robust-0.1`, `robust-0.3` and `robust-0.7`, good over all `hexmj.variants`; and `lasting-0.1` ...
+`lasting-0.9` and `lasting`, which were searched under that model variant and use it."""
