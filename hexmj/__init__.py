@@ -42,12 +42,12 @@ if TYPE_CHECKING:
     from hexmj.measures.physical import physical_walk as physical_walk
     from hexmj.plotting import plot as plot
     from hexmj.replay.film import Film as Film
-    from hexmj.replay.video import render as render
     from hexmj.replay.page import page as page
     from hexmj.replay.recording import load_recording as load_recording
     from hexmj.replay.recording import record as record
     from hexmj.replay.recording import record_plan as record_plan
     from hexmj.replay.recording import save_recording as save_recording
+    from hexmj.replay.video import render as render
     from hexmj.search.forms import FieldsForm as FieldsForm
     from hexmj.search.forms import NetworkForm as NetworkForm
     from hexmj.search.problems import Problem as Problem

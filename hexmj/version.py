@@ -1,3 +1,3 @@
-"""Of this package, for whoever asks and for what installs it."""
+"""Version of the package."""
 
-__version__ = "0.5.0"
+__version__ = "0.6.0"

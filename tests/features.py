@@ -339,7 +339,9 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "league": f"{LEAGUE} --controller ldvs graham wilson-ideal tripod.py:Tripod --dt 0.5 --vp 200 --no-video",
     "ablate": "ablate --controller ldvs walknet --velocity 0.8 --starts 10 --physical-starts 1 --dt 0.5",
     "map V_p": lambda: resumed("map --over vp --values 40 160 --velocity 0.8 --starts 4 --observation-time 20"),
-    "map centre of mass": "map --over centre_of_mass --values -5 0 --velocity 0.8 --starts 3 --observation-time 20 --vp 200",
+    "map centre of mass": (
+        "map --over centre_of_mass --values -5 0 --velocity 0.8 --starts 3 --observation-time 20 --vp 200"
+    ),
     "disturb": "disturb --velocity 0.5 --starts 2 --observation-time 40 --impulses 5 --dt 0.5 --vp 200",
     "disturb kinematic": "disturb --kinematic --velocity 0.7 --starts 8 --observation-time 40",
     "terrain": "terrain --velocity 0.8 --starts 2 --grounds step gap rough --lengths 10 --grasps 0 1 --dt 0.5",

@@ -66,7 +66,9 @@ def other_conditions(seed: int) -> Arrays:
     )  # fmt: skip
     stride = hexmj.Stride(geometry=hexmj.CENTRED, dt=0.2)
     return _table(
-        hexmj.compare(hexmj.HWS, [0.4], n_starts=6, observation_time=60.0, seed=seed, conditions=conditions, stride=stride)
+        hexmj.compare(
+            hexmj.HWS, [0.4], n_starts=6, observation_time=60.0, seed=seed, conditions=conditions, stride=stride
+        )
     )
 
 
@@ -112,7 +114,9 @@ def converged(seed: int) -> Arrays:
     from hexmj.studies.static_limit import StaticLimit
     from hexmj.sweep import run_study
 
-    return _table(run_study(StaticLimit(hexmj.LDVS, vps=[200.0, 80.0], n_starts=6, observation_time="start", seed=seed)))
+    return _table(
+        run_study(StaticLimit(hexmj.LDVS, vps=[200.0, 80.0], n_starts=6, observation_time="start", seed=seed))
+    )
 
 
 def searched(seed: int) -> Arrays:

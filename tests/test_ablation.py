@@ -1,6 +1,7 @@
 """Ablation: controllers without one of their parts."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -93,7 +94,8 @@ def test_a_file_is_called_by_its_short_name(tmp_path: Path, monkeypatch: pytest.
 )
 def test_bad_input_is_refused(name: str, wrong: dict) -> None:
     with pytest.raises(InputError, match=name.replace("velocities", "velocit")):
-        Ablation(**{"controllers": {"ldvs": switched("ldvs")}} | wrong)
+        settings: Any = {"controllers": {"ldvs": switched("ldvs")}} | wrong
+        Ablation(**settings)
 
 
 @pytest.mark.parametrize("name", ["ldvs-without-2", "ldvs-without-7", "walknet-with-2", "graham-without-1"])

@@ -106,7 +106,7 @@ def test_unknown_arguments_are_pythons_own_errors(call: Callable[[], Any], error
 def test_numbers_of_numpy_are_numbers():
     usual = hexmj.flss(hexmj.LDVS, [0.5], n_starts=30, seed=4, observation_time=20.0)
     arguments: Any = {"n_starts": np.int64(30), "seed": np.uint8(4), "observation_time": np.float64(20.0)}
-    assert hexmj.flss(hexmj.LDVS, np.array([0.5]), **arguments).identical(usual)
+    assert hexmj.flss(hexmj.LDVS, np.array([0.5]).tolist(), **arguments).identical(usual)
     assert hexmj.Stride(dt=np.float32(0.25)) == hexmj.Stride(dt=0.25)  # pyright: ignore
 
 

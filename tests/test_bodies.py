@@ -159,6 +159,8 @@ def test_what_an_mjcf_lacks_is_added(insect: CompiledBody, tmp_path: Path):
 
 
 UNLISTED = {"\n  <contact>\n": "\n  <!--\n", "  </contact>\n": "  -->\n"}
+
+
 @pytest.mark.parametrize(
     ("changes", "under"),
     [

@@ -104,7 +104,8 @@ def test_the_values_of_every_condition_make_sense():
         assert Conditions().values()[name] in condition.values
         assert sorted(condition.values) == list(condition.values)
         for value in condition.values:
-            assert Conditions(**{name: value}).values()[name] == value
+            varied: Any = {name: value}
+            assert Conditions(**varied).values()[name] == value
     assert set(FLSS) == {"kinematic", "measured", "physical", "toppled", "static"}
 
 

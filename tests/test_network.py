@@ -65,7 +65,10 @@ def random_starts(rng: np.random.Generator, size: int) -> np.ndarray:
 def test_equals_plain_network_to_the_last_bit(seed, size, threads, rules, geometry, velocity, rate):
     rng = np.random.default_rng(seed)
     p, starts, (order, model_variant) = random_weights(rng), random_starts(rng, size), rules
-    controller, stride = Cruse1998(p, order, model_variant=model_variant), Stride(geometry=geometry, dt=rng.choice([0.1, 0.25]))
+    controller, stride = (
+        Cruse1998(p, order, model_variant=model_variant),
+        Stride(geometry=geometry, dt=rng.choice([0.1, 0.25])),
+    )
     acceleration = Acceleration(rate, start=velocity / 2) if rate else None
     steps = 250
     options = {"stride": stride, "acceleration": acceleration, "threads": threads}

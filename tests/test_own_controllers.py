@@ -83,7 +83,9 @@ def test_the_guide_shows_the_example():
 
 @pytest.mark.slow
 def test_oscillators_reach_the_tripod():
-    found = steady_state_gait(hexmj.load_controller(OWN["tripod"]), 0.5, n_starts=20, stride=STRIDE, periods=CYCLES + 10)
+    found = steady_state_gait(
+        hexmj.load_controller(OWN["tripod"]), 0.5, n_starts=20, stride=STRIDE, periods=CYCLES + 10
+    )
     assert found.periodic.all()
     assert found.stable.all()
     assert found.phase == pytest.approx(np.full((20, 7), 0.5), abs=0.01)

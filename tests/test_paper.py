@@ -52,7 +52,7 @@ def test_claims_name_measurements_and_the_protocol_is_the_papers():
 
 def test_measured_losses_are_those_of_flss():
     protocol = replace(TINY, sample=20)
-    how = {"n_starts": 140, "seed": protocol.seed}
+    how: Any = {"n_starts": 140, "seed": protocol.seed}
     slow, fast = lost("ldvs", protocol), lost("hws accelerated", protocol)
     for time in OBSERVATION_TIMES:
         table = flss(LDVS, protocol.velocities, observation_time=time, **how)
@@ -223,7 +223,8 @@ def test_the_command_judges_chosen_claims(run: Any, tmp_path: Path, monkeypatch:
 )
 def test_bad_input_is_refused_before_the_work(tmp_path: Path, chosen: dict[str, Any], name: str):
     with pytest.raises(InputError, match=name):
-        reproduce(tmp_path / "out", **{"protocol": TINY} | chosen)
+        settings: Any = {"protocol": TINY} | chosen
+        reproduce(tmp_path / "out", **settings)
     assert not (tmp_path / "out").exists()
     with pytest.raises(InputError):
         replace(TINY, gait_starts=0)

@@ -186,7 +186,10 @@ def test_our_own_sets_beat_the_papers(observation_time, names, velocities):
     """On fresh starts; over the observation time `start` LDVS is better than `own` at V = 0.1 (docs/paper.md)."""
     for v in velocities:
         own, papers = (
-            [flss(PRESETS[name.format(v)], [v], seed=7, observation_time=observation_time).flss.item() for name in group]
+            [
+                flss(PRESETS[name.format(v)], [v], seed=7, observation_time=observation_time).flss.item()
+                for name in group
+            ]
             for group in (names, ["hws", "ldvs"])
         )
         assert max(own) < min(papers)

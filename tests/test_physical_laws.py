@@ -98,7 +98,9 @@ def test_mirrored_starts_walk_mirrored_paths():
 def test_physical_flss_at_a_quarter_of_the_time_step_stays_within_its_interval():
     """`test_physics` has the half of it, over the observation time `walk`."""
     conditions = (Conditions(longest_substep=ms) for ms in (0.625, 0.15625))
-    whole, quarter = (physical_flss(LDVS, [0.5], n_starts=60, observation_time="start", conditions=one) for one in conditions)
+    whole, quarter = (
+        physical_flss(LDVS, [0.5], n_starts=60, observation_time="start", conditions=one) for one in conditions
+    )
     assert whole.low.item() <= quarter.flss.item() <= whole.high.item()
 
 

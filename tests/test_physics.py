@@ -200,8 +200,7 @@ def test_what_one_is_told_until_it_falls_does_not_depend_on_who_walks_beside_it(
 
 
 def test_a_start_that_does_not_settle_is_an_error_not_a_fall():
-    with pytest.raises(
-        SimulationError):
+    with pytest.raises(SimulationError):
         settle(draw_starts(2, 0), Conditions(settling_time=1.0))
     with pytest.raises(SimulationError):
         settle(draw_starts(24, 0), Conditions(settling_time=0.01, longest_substep=0.3125))

@@ -52,8 +52,7 @@ def test_a_push_that_is_not_all_within_the_walk_is_refused(time):
     for impulse, refused in ((0.0, False), (100.0, True)):
         push = Push(np.array([0.0, impulse]), np.array([0.0, time]))
         chunks = drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.05, push=push)
-        said = pytest.raises(
-            InputError)
+        said = pytest.raises(InputError)
         with said if refused else nullcontext():
             list(chunks)
     assert list(

@@ -11,8 +11,7 @@ import xarray as xr
 
 import hexmj
 from hexmj import Effort, FieldsForm, NetworkForm, Problem
-from hexmj.controllers.cruse1998 import MODEL_VARIANTS, Cruse1998
-from hexmj.controllers.cruse1998 import network_toml
+from hexmj.controllers.cruse1998 import MODEL_VARIANTS, Cruse1998, network_toml
 from hexmj.controllers.registry import searched_on
 from hexmj.errors import InputError
 from hexmj.search.forms import named_form
@@ -26,7 +25,7 @@ HWS = NetworkForm("hws")
 PROBLEM = Problem(HWS, 0.5, 0.5, observation_time="start")
 EFFORT = Effort(budget=100, starts=60, refine_starts=200, refine_budget=60, seed=3)
 FEW = Effort(budget=30, starts=20, refine_budget=0)
-SMALL: dict[str, Any] = {"budget": 10, "starts": 10, "refine_budget": 0, "verdict_starts": 20}
+SMALL: Any = {"budget": 10, "starts": 10, "refine_budget": 0, "verdict_starts": 20}
 
 
 def test_a_search_lowers_the_cost():

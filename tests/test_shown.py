@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import hexmj
-from hexmj.walks import spans
 from hexmj.gaits import Gait, steady_state_gait
 from hexmj.legs import LEGS
+from hexmj.walks import spans
 
 STARTS = hexmj.draw_starts(3, seed=1)
 MODULES = {

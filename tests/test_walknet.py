@@ -79,7 +79,9 @@ def test_rule_1_lasts_after_touchdown_for_a_time_that_falls_with_velocity(consta
 
 @pytest.mark.parametrize(("constants", "begin", "end"), [(CURVE, 0.27, 0.32), (REACOG, 0.37, 0.42)])
 def test_rule_2_acts_within_its_window_of_time(constants, begin, end) -> None:
-    found = [shifts(constants, 2, L2, 0.02, age)[L1] > 0 for age in (begin - 0.01, begin + 0.01, end - 0.01, end + 0.01)]
+    found = [
+        shifts(constants, 2, L2, 0.02, age)[L1] > 0 for age in (begin - 0.01, begin + 0.01, end - 0.01, end + 0.01)
+    ]
     assert found == [False, True, True, False]
 
 

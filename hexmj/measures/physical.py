@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import advanced, begin, check_repeats, check_same
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
-from hexmj.walks import footfall_html
 from hexmj.measures.kinematic import first_loss
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, WalkSoFar
 from hexmj.physics.pushes import Push
@@ -16,7 +15,7 @@ from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, settle
 from hexmj.progress import Progress, progress_bar
 from hexmj.timing import Acceleration, Stride, steps_within
-from hexmj.walks import PlannedWalk, Walk, copied, extent, joined, part_of
+from hexmj.walks import PlannedWalk, Walk, copied, extent, footfall_html, joined, part_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.walks import spans
 from hexmj.legs import LEGS
 from hexmj.measures.tables import VELOCITY
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import kept_gaits, main_peak
 from hexmj.phases import PAIRS, circular_mean, wilson_phase
 from hexmj.timing import OBSERVATION_TIMES
+from hexmj.walks import spans
 
 if TYPE_CHECKING:
     import xarray as xr
