@@ -87,17 +87,6 @@ def test_measured_tips_follow_the_plan(walked):
     assert walked.outcomes.saturation.max() < 0.02
 
 
-@pytest.mark.parametrize("controller", [LDVS, SensoryFeedback(LDVS)], ids=lambda one: one.name)
-def test_progress_is_the_share_of_the_substeps(settled, controller):
-    told: list[float] = []
-    steps, plan = 45 * settled.substeps, begin(controller, settled.starts, 0.2, settled.stride)
-    for chunk in drive(settled, plan, 4.5, progress=told.append):
-        assert sum(told) == pytest.approx(chunk.first / steps)  # of the chunks before
-        assert all(one > 0 for one in told)
-    assert len(told) > 1
-    assert sum(told) == pytest.approx(1.0)
-
-
 def test_every_bounce_counts_without_a_contact_gap():
     """Measured stability is stricter the shorter the gap; what the body does is the same."""
     every, usual = (
@@ -307,12 +296,6 @@ def test_every_start_is_stable_fallen_or_refused_with_a_reason():
 def test_starts_out_of_reach_are_refused():
     with pytest.raises(InputError):
         settle(np.full((1, 6), -30.0), stride=Stride(pep_min=-30.0))
-
-
-def test_targets_out_of_reach_are_counted():
-    low = Conditions(standing_height=7.0, step_height=14.0)
-    outcomes = physical_outcomes(settle(draw_starts(4, 0), low), LDVS, 0.5, 40.0)
-    assert outcomes.unreachable.sum() > 0
 
 
 def test_legs_out_of_reach_keep_their_last_angles_however_the_plan_is_divided():

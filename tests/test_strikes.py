@@ -1,7 +1,5 @@
 """Feet never sink in: steps in which one strikes the ground are taken finely, and no others."""
 
-import pickle
-
 import mujoco
 import numpy as np
 import pytest
@@ -14,8 +12,6 @@ from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller
-from hexmj.environments import dm
-from hexmj.environments.dm import InsectPhysics
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics import substeps as fine_steps
 from hexmj.physics.engine import Diverged, Engine, Rolled
@@ -194,36 +190,6 @@ def test_forces_of_a_fine_step_are_means():
     assert_array_equal(in_whole_steps(sensors, 4, np.array([1])), [[0.0, 5.5, 2.0], [12.0, 17.5, 14.0]])
 
 
-def thrown() -> InsectPhysics:
-    """An insect thrown at the ground at 1 m/s, so that its next steps have to be fine."""
-    walking = dm.load(actions="joints")
-    walking.reset()
-    walking.physics.data.qvel[2] = -1000.0
-    walking.physics.forward()
-    return walking.physics
-
-
-@pytest.mark.parametrize(
-    "copied", [InsectPhysics.copy, lambda one: pickle.loads(pickle.dumps(one))], ids=["copied", "pickled"]
-)
-def test_a_copy_of_the_environments_physics_goes_on_the_same_way(copied, monkeypatch):
-    """As planners need it, in fine steps too, and in another process."""
-    physics = thrown()
-    copies = copied(physics), copied(physics)
-    physics.step(2)
-    copies[0].step(2)
-    assert_array_equal(copies[0].position(), physics.position())
-    never_finely(monkeypatch)
-    copies[1].step(2)
-    assert (copies[1].position() != physics.position()).any(), "these steps were not fine"
-
-
-def test_fine_steps_of_the_environment_last_no_longer():
-    physics = thrown()
-    physics.step(2)
-    assert physics.time() == pytest.approx(2 * physics.timestep(), rel=1e-12)
-
-
 class PointMasses:
     """An `Engine` of its own: feet that fall freely, on ground of any depth, with one number to control each body.
 
@@ -294,14 +260,6 @@ def test_any_engine_takes_strikes_again_finely():
     assert 0.02 < shown["depth"][3].max() <= 2140.0 * PointMasses.STEP / FINEST  # no finer than this
     alone = PointMasses(np.ones(1), np.array([5000.0]))
     assert_array_equal(shown["after"][2], alone.roll(np.array([0]), np.zeros((1, 8, 1)), 1).after[0])
-
-
-def test_what_strikes_depends_on_nothing_but_itself_on_any_engine():
-    together = falling([-400.0, 0.0, -2000.0, -50.0])[1]
-    for i, speed in enumerate([-400.0, 0.0, -2000.0, -50.0]):
-        alone = falling([speed])[1]
-        for name, values in together.items():
-            assert_array_equal(alone[name][0], values[i])
 
 
 def test_a_body_that_diverges_says_from_which_step_on():

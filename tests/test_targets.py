@@ -177,24 +177,6 @@ def test_a_height_of_its_own_and_a_place_beside_the_line_are_honoured(vp: float,
     assert_allclose(tips[m - 1 :: m], at_steps, rtol=0, atol=1e-12)
 
 
-def test_the_body_goes_on_where_the_plan_names_no_height_any_more():
-    """A foot is lifted as if the plan had named none before, and the others as if it had named none at all."""
-    conditions, steps = Conditions(), 80
-    x, swings = np.tile(0.01 * np.arange(steps)[:, np.newaxis], 6), np.zeros((steps, 6), dtype=bool)
-    own = np.full((steps, 6), np.nan)
-    own[20:40, 2] = np.linspace(11.0, 3.0, 20)
-    path, m = conditions, conditions.substeps(STRIDE)
-    heights = []
-    for plan in (planned(x, swings), planned(x, swings, height=own)):
-        tips = TipTargets(x[:1], conditions, STRIDE).follow(plan, np.arange(1))
-        heights.append(tips[0, m - 1 :: m, :, 2] + path.standing_height)
-    usual, named = heights
-    assert usual[-1].min() == pytest.approx(path.step_height)
-    assert_allclose(named[20:40, 2], own[20:40, 2])
-    named[20:40, 2] = usual[20:40, 2]
-    assert_array_equal(named, usual)
-
-
 def test_starts_left_out_change_nothing_for_the_others():
     starts, conditions = draw_starts(6, 1), Conditions()
     whole, part = TipTargets(starts, conditions, STRIDE), TipTargets(starts, conditions, STRIDE)

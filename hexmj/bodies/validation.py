@@ -35,7 +35,7 @@ RULES = (
     ("armature of the root", "dof_armature", ROOT_DOFS, 0, 0),
     ("damping of a leg's joint", "dof_damping", LEG_DOFS, 0, inf),
     ("margin of a joint", "jnt_margin", slice(None), 0, 0),
-    ("actuatorfrclimited of a joint", "jnt_actfrclimited", slice(None), 0, 0),
+    ("actuatorfrclimited of a joint, set by actuatorfrcrange or the effort in a URDF", "jnt_actfrclimited", slice(None), 0, 0),
     ("dyntype of an actuator", "actuator_dyntype", slice(None), 0, 0),
     ("condim of a contact pair", "pair_dim", slice(None), 3, inf),
     ("solimp of a contact pair", "pair_solimp", ENDS, 0.9, inf),
