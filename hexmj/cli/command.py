@@ -9,7 +9,7 @@ from textwrap import fill
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from hexmj.cli.options import Figures, Output, Planning, Workers, build, flat, options_class
+from hexmj.cli.options import Figures, Output, Planning, Results, Workers, build, flat, options_class
 from hexmj.cli.output import lists_of, print_json, show
 
 if TYPE_CHECKING:
@@ -47,9 +47,8 @@ class Command:
         if help:
             print(fill(" ".join((self.__doc__ or "").split()), 80), end="\n\n")
         try:
-            parsed = tyro.cli(
-                self.options(name, help), prog=f"hexmj {name}", description="", args=words, config=markers
-            )
+            how: Any = {"prog": f"hexmj {name}", "description": "", "config": markers}
+            parsed = tyro.cli(self.options(name, help), args=words, **how)
         except SystemExit:
             if help:
                 print("Examples:", *(f"  hexmj {name} {example}".rstrip() for example in self.examples), sep="\n")
@@ -66,19 +65,18 @@ class StudyCommand(Command):
 
     study: ClassVar[str]
     """Place of the study's dataclass."""
-    doing: ClassVar[str]
-    """Label of the progress bar."""
     data: ClassVar[str]
     """Name of the NetCDF file, in which options may stand in braces."""
     figures: ClassVar[Mapping[str, str]]
-    """Name of a figure's file, without its ending -> name of the figure, see `hexmj.plot`."""
+    """File of a figure, without its ending -> name of the figure, see `hexmj.plot`."""
     manifest: ClassVar[str] = "manifest.json"
     own: ClassVar[tuple[type, ...]] = ()
     """Dataclasses of options beside those of the study."""
     planning: ClassVar[tuple[type, ...]] = (Planning,)
 
     def options(self, name: str, help: bool = True) -> type:
-        self.sources = (*self.own, self.study, Output, *self.planning, Workers, Figures)  # pyright: ignore
+        self.sources = (*self.own, self.study, Results, Output, *self.planning, Workers, Figures)  # pyright: ignore
+        self.usual = {**self.usual, "out": Path("results") / name}  # pyright: ignore
         return super().options(name, help)
 
     def build(self, given: SimpleNamespace) -> "Study":
@@ -103,15 +101,14 @@ class StudyCommand(Command):
         from hexmj.sweep import run_study
 
         study, folder = self.build(given), results_folder(given.out)
-        with at_work(given, self.doing) as execution:
+        with at_work(given, given.command[0]) as execution:
             result = run_study(study, folder / "walks", **execution)
         files = [save(result, folder / self.data.format(**vars(given)))]
         for name, which in self.figures.items():
             files.append(draw(result, folder / f"{name.format(**vars(given))}.{given.format}", which))
         files += self.others(given, result)
-        files.append(
-            save_manifest(given.command, settings(result), files, folder / self.manifest.format(**vars(given)))
-        )
+        manifest = folder / self.manifest.format(**vars(given))
+        files.append(save_manifest(given.command, settings(result), files, manifest))
         if given.json:
             print_json(self.summary(result) | {"searched": searched(given), "files": files})
         else:

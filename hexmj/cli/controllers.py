@@ -35,8 +35,6 @@ class LeagueOptions:
     """Velocities V_r as fractions of V_p, 0 < V < 1; by default 0.1, 0.2 ... 0.9, or 0.1, 0.5, 0.9 with --quick."""
     n_starts: int | None = None
     """Number of random starts of kinematic walks, the same for all; by default 1000, or 200 with --quick."""
-    out: Path = Path("results/league")
-    """Folder for tables, figures, film, NetCDF, manifest and cached results."""
     physical_starts: int | None = None
     """Number of these starts that walk in physics at every velocity; by default 200, or 8 with --quick."""
     trial_starts: int | None = None
@@ -55,7 +53,6 @@ class League(StudyCommand):
     own = (LeagueOptions,)
     planning = ()
     hidden = ("periods", "accelerating")
-    doing = "running the league"
     data = "league.nc"
     figures = {"league": "league", "league_walks": "walks"}  # noqa: RUF012
     examples = ("--quick", "--controller ldvs mine.py:Mine --velocity 0.5 --no-video")
@@ -122,8 +119,6 @@ class AblateOptions:
 
     controllers: tuple[str, ...] = ("ldvs", "walknet")
     """Weight sets of the 1998 network by name, walknet or walknet-reacog."""
-    out: Path = Path("results/ablate")
-    """Folder for figure, NetCDF, manifest and cached results."""
 
 
 class Ablate(StudyCommand):
@@ -134,7 +129,6 @@ class Ablate(StudyCommand):
     own = (AblateOptions,)
     planning = ()
     hidden = ("periods",)
-    doing = "walking without parts"
     data = "ablation.nc"
     figures = {"ablation": "ablation"}  # noqa: RUF012
     examples = ("--controller ldvs --velocity 0.5", "--controller walknet --starts 200 --physical-starts 20")

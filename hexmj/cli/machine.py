@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, metadata, requires, version
+from importlib.metadata import metadata, requires, version
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +17,7 @@ from typing import Any
 
 from hexmj.cli.command import Command
 from hexmj.cli.options import Output
-from hexmj.cli.output import print_json, report_checks
+from hexmj.cli.output import print_json, report_checks, show
 from hexmj.errors import InputError
 
 RENDERING = """
@@ -74,23 +74,15 @@ def versions() -> str:
     from packaging.requirements import Requirement
     from packaging.specifiers import SpecifierSet
 
-    python, wanted = platform.python_version(), metadata("hexmj")["Requires-Python"]
-    wrong = [] if SpecifierSet(wanted).contains(python) else [f"Python {python}, expected {wanted}"]
-    count = 0
-    for requirement in map(Requirement, requires("hexmj") or []):
-        if requirement.marker and not requirement.marker.evaluate({"extra": ""}):
-            continue
-        count += 1
-        try:
-            found = version(requirement.name)
-        except PackageNotFoundError:
-            wrong.append(f"{requirement.name} is not installed")
-            continue
-        if not requirement.specifier.contains(found, prereleases=True):
-            wrong.append(f"{requirement.name} {found}, expected {requirement.specifier}")
-    if wrong:
-        raise RuntimeError("; ".join(wrong))
-    return f"Python {python}, mujoco {version('mujoco')} and {count - 1} more packages within their bounds"
+    needed = [Requirement(line) for line in requires("hexmj") or []]
+    needed = [one for one in needed if not one.marker or one.marker.evaluate({"extra": ""})]
+    bounds = {"python": SpecifierSet(metadata("hexmj")["Requires-Python"])} | {
+        one.name: one.specifier for one in needed
+    }
+    found = {name: platform.python_version() if name == "python" else version(name) for name in bounds}
+    if wrong := [name for name in bounds if not bounds[name].contains(found[name], prereleases=True)]:
+        raise RuntimeError("; ".join(f"{name} {found[name]}, expected {bounds[name]}" for name in wrong))
+    return f"Python {found['python']}, mujoco {found['mujoco']} and {len(found) - 2} more packages within their bounds"
 
 
 def threads() -> str:
@@ -188,54 +180,36 @@ class Rerun(Command):
         from hexmj.cli.main import run
         from hexmj.io import MANIFEST, read_manifest
 
-        path = given.result if given.result.is_file() else next(iter(sorted(given.result.glob(f"*{MANIFEST}"))), None)
-        if path is None:
+        found = [given.result] if given.result.is_file() else sorted(given.result.glob(f"*{MANIFEST}"))
+        if not found:
             raise InputError(f"{given.result} holds no {MANIFEST} of a command")
-        then = read_manifest(path)
+        then = read_manifest(found[0])
+        names = [name for name in then["files"] if name.endswith(".nc")]
+        if not names:
+            raise InputError(f"{found[0]} names no NetCDF file to compare")
+        more = {"--threads": given.threads, "--processes": given.processes}
+        words = [word for name, value in more.items() if value is not None for word in (name, str(value))]
         with tempfile.TemporaryDirectory(prefix="hexmj-rerun-") as folder:
             with redirect_stdout(StringIO()):
-                run([*_without(then["command"], "--out"), *_workers(given), "--out", folder])
-            files = {
-                name: _difference(path.parent / name, Path(folder) / name)
-                for name in then["files"]
-                if name.endswith(".nc")
-            }
-            now = read_manifest(Path(folder) / path.name)
-        if not files:
-            raise InputError(f"{path} names no NetCDF file to compare")
-        changed = {name: [then["versions"].get(name), one] for name, one in now["versions"].items()}
-        changed = {name: pair for name, pair in changed.items() if pair[0] != pair[1]}
+                run([*_without_output(then["command"]), *words, "--out", folder])
+            files = {name: _difference(found[0].parent / name, Path(folder) / name) for name in names}
+            now = read_manifest(Path(folder) / found[0].name)
+        pairs = {name: [then["versions"].get(name), version] for name, version in now["versions"].items()}
+        versions = {name: [old, new] for name, (old, new) in pairs.items() if old != new}
         equal = not any(files.values())
         if given.json:
-            print_json(
-                {
-                    "equal": equal,
-                    "manifest": path,
-                    "command": then["command"],
-                    "differences": files,
-                    "versions": changed,
-                }
-            )
+            print_json({"equal": equal, "command": then["command"], "differences": files, "versions": versions})
         else:
-            for name, text in files.items():
-                print(f"{name}: {text or 'equal to the last bit'}")
-            for name, (old, new) in changed.items():
-                print(f"{name} was {old}, now it is {new}")
+            show(*(f"{name}: {text or 'equal to the last bit'}" for name, text in files.items()))
+            show(*(f"{name} was {old}, now it is {new}" for name, (old, new) in versions.items()))
         sys.exit(0 if equal else 1)
 
 
-def _without(words: list[str], option: str) -> list[str]:
-    """Return a command line without an option and its value."""
-    words = [word for word in words if word != "--json" and not word.startswith(f"{option}=")]
-    if option in words:
-        at = words.index(option)
-        del words[at : at + 2]
-    return words
-
-
-def _workers(given: SimpleNamespace) -> list[str]:
-    named = {"--threads": given.threads, "--processes": given.processes}
-    return [word for name, value in named.items() if value is not None for word in (name, str(value))]
+def _without_output(words: list[str]) -> list[str]:
+    """Return a command line without --json and --out."""
+    kept = [word for word in words if word != "--json" and not word.startswith("--out=")]
+    at = kept.index("--out") if "--out" in kept else len(kept)
+    return [*kept[:at], *kept[at + 2 :]]
 
 
 def _difference(then: Path, now: Path) -> str:

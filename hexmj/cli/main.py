@@ -12,57 +12,56 @@ from hexmj.version import __version__
 if TYPE_CHECKING:
     from hexmj.cli.command import Command
 
-ABOUT = "Controllers of six-legged walking drive a stick insect in MuJoCo; hexmj measures\nits stability."
+HELP = """usage: hexmj COMMAND [OPTIONS]
 
-GROUPS: dict[str, tuple[str, dict[str, str]]] = {
-    "Walk and measure": (
-        "measures",
-        {
-            "walk": "one walk: footfall diagram, stability margin and a recording",
-            "flss": "frequency of the loss of static stability over velocities",
-            "compare": "kinematic, measured and physical FLSS on the same starts",
-        },
-    ),
-    "Look": (
-        "pictures",
-        {
-            "render": "a video of recordings, or of a walk that is recorded first",
-            "page": "an HTML file that plays recordings without a network",
-            "view": "a walk or a recording in a window or a browser",
-        },
-    ),
-    "Studies": (
-        "studies",
-        {
-            "map": "physical FLSS over the velocity and one condition",
-            "disturb": "walks with a halt, a stopped leg or a push",
-            "terrain": "falls at steps, gaps, hurdles and on rough ground",
-            "converge": "the same starts at smaller and smaller V_p",
-            "biology": "forces, gait, posture and work beside those of insects",
-        },
-    ),
-    "Controllers": (
-        "controllers",
-        {
-            "league": "all controllers on the same starts: tables, figures, film",
-            "ablate": "what each mechanism of a controller contributes",
-            "search": "parameters that minimise the FLSS",
-            "check-controller": "interface checks of a controller",
-        },
-    ),
-    "Paper": ("paper", {"reproduce": "the claims and figures of the 1998 paper"}),
-    "Machine": (
-        "machine",
-        {
-            "doctor": "checks of this machine, each with a remedy",
-            "rerun": "repeat a command from its manifest and compare the results",
-        },
-    ),
+Controllers of six-legged walking drive a stick insect in MuJoCo; hexmj measures
+its stability.
+
+Walk and measure
+  walk              one walk: footfall diagram, stability margin and a recording
+  flss              frequency of the loss of static stability over velocities
+  compare           kinematic, measured and physical FLSS on the same starts
+
+Look
+  render            a video of recordings, or of a walk that is recorded first
+  page              an HTML file that plays recordings without a network
+  view              a walk or a recording in a window or a browser
+
+Studies
+  map               physical FLSS over the velocity and one condition
+  disturb           walks with a halt, a stopped leg or a push
+  terrain           falls at steps, gaps, hurdles and on rough ground
+  converge          the same starts at smaller and smaller V_p
+  biology           forces, gait, posture and work beside those of insects
+
+Controllers
+  league            all controllers on the same starts: tables, figures, film
+  ablate            what each mechanism of a controller contributes
+  search            parameters that minimise the FLSS
+  check-controller  interface checks of a controller
+
+Paper
+  reproduce         the claims and figures of the 1998 paper
+
+Machine
+  doctor            checks of this machine, each with a remedy
+  rerun             repeat a command from its manifest and compare the results
+
+`hexmj COMMAND --help` shows the options and examples of a command.
+`hexmj --version` shows the version; `hexmj --tyro-print-completion bash`
+(or zsh) prints a script that completes commands and options."""
+
+MODULES = {
+    "measures": ("walk", "flss", "compare"),
+    "pictures": ("render", "page", "view"),
+    "studies": ("map", "disturb", "terrain", "converge", "biology"),
+    "controllers": ("league", "ablate", "search", "check-controller"),
+    "paper": ("reproduce",),
+    "machine": ("doctor", "rerun"),
 }
-"""Title of a group -> the module of its commands, and each command with its summary."""
+"""Module -> its commands; `check-controller` is the class `CheckController`."""
 
-COMMANDS = {name: module for module, commands in GROUPS.values() for name in commands}
-"""Command -> its module; `check-controller` is the class `CheckController`."""
+COMMANDS = {name: module for module, names in MODULES.items() for name in names}
 
 
 def main() -> None:
@@ -90,7 +89,7 @@ def run(words: list[str]) -> None:
     """
     match words:
         case [] | ["-h" | "--help"]:
-            print(_help())
+            print(HELP)
         case ["--version"]:
             print(f"hexmj {__version__}")
         case [word, *_] if word.startswith("--tyro-"):
@@ -105,18 +104,6 @@ def run(words: list[str]) -> None:
 def command(name: str) -> "Command":
     """Return a command by its name."""
     return getattr(import_module(f"hexmj.cli.{COMMANDS[name]}"), name.title().replace("-", ""))()
-
-
-def _help() -> str:
-    lines = ["usage: hexmj COMMAND [OPTIONS]", "", ABOUT]
-    for title, (_, commands) in GROUPS.items():
-        lines += ["", title, *(f"  {name:18}{summary}" for name, summary in commands.items())]
-    return "\n".join([
-        *lines, "",
-        "`hexmj COMMAND --help` shows the options and examples of a command.",
-        "`hexmj --version` shows the version; `hexmj --tyro-print-completion bash`",
-        "(or zsh) prints a script that completes commands and options.",
-    ])  # fmt: skip
 
 
 def _complete(words: list[str]) -> None:

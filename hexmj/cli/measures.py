@@ -8,6 +8,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hexmj.cli.command import Command, StudyCommand, at_work, draw, searched, settings_line
 from hexmj.cli.options import (
     Figures,
@@ -23,8 +25,10 @@ from hexmj.cli.options import (
     stride,
 )
 from hexmj.cli.output import (
+    Column,
     four_digits,
-    interval,
+    grid,
+    intervals,
     physical_report,
     print_json,
     report_line,
@@ -38,7 +42,6 @@ from hexmj.timing import Acceleration, Stride, observation_duration
 
 if TYPE_CHECKING:
     import xarray as xr
-    from rich.table import Table
 
     from hexmj.measures.physical import PhysicalWalk
 
@@ -252,8 +255,6 @@ class Flss(Command):
 class CompareOptions:
     """Options of a comparison."""
 
-    out: Path = Path("results/compare")
-    """Folder for the results and cached results."""
     no_video: bool = False
     """Leave the video out."""
 
@@ -265,7 +266,6 @@ class Compare(StudyCommand):
     study = "measures.compare:Comparison"
     own = (CompareOptions,)
     usual = {"controller": ("ldvs", "uncoordinated")}  # noqa: RUF012
-    doing = "comparing"
     data = "comparison.nc"
     figures = {"comparison": "comparison"}  # noqa: RUF012
     examples = ("", "--controller hws wilson --velocity 0.5 --starts 20 --no-video")
@@ -306,37 +306,30 @@ class Compare(StudyCommand):
         return summary | {"report": physical_report(result), "settings": settings(result) | durations}
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        frequencies, answers = _tables(result)
+        from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES
+
+        axes, names = ("controller", "velocity"), ("both", "kin.", "phys.", "none")
+        columns: dict[str, Column] = {"t": lambda data: four_digits(data.duration.item())}
+        counts = {heading: _number(name, "d") for heading, name in zip(names, AGREEMENT, strict=True)}
+        answers = {"agree": _number("agreement", ".2f"), **counts, **{name: _number(name, ".3f") for name in BESIDE}}
         yield "Frequency of the loss of static stability, with 95 % intervals; physical: falls"
-        yield frequencies
+        yield grid(result, axes, columns | intervals(MEASURES))
         yield (
             "Starts that lost the planned stability and fell (both), did either (kin., phys.) or none; speed over the"
             " commanded one, least to greatest of the starts that did not fall"
         )
-        yield answers
+        yield grid(result, axes, answers | {"speed": _speeds})
         yield report_line(physical_report(result))
 
 
-def _tables(result: "xr.Dataset") -> "tuple[Table, Table]":
-    """Return the frequencies, and what the starts did, with a row for each controller and velocity."""
-    import numpy as np
+def _number(name: str, form: str) -> Column:
+    return lambda data: f"{data[name].item():{form}}"
 
-    from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES
 
-    frequencies, answers = [], []
-    for name in result.controller.values:
-        for v in result.velocity.values:
-            data = result.sel(controller=name, velocity=v)
-            intervals = (interval(data, measure) for measure in MEASURES)
-            frequencies.append((name, f"{v:g}", four_digits(data.duration.item()), *intervals))
-            speed = data.speed.values[np.isinf(data.fall.values)]
-            speeds = f"{speed.min():.2f}-{speed.max():.2f}" if np.isfinite(speed).any() else "-"
-            counts = [str(data[case].item()) for case in AGREEMENT]
-            answers.append(
-                (name, f"{v:g}", f"{data.agreement.item():.2f}", *counts, f"{data.toppled.item():.3f}", speeds)
-            )
-    heads = ("agree", "both", "kin.", "phys.", "none", *BESIDE, "speed")
-    return table(("controller", "V", "t", *MEASURES), frequencies), table(("controller", "V", *heads), answers)
+def _speeds(data: "xr.Dataset") -> str:
+    """Return the least and the greatest speed of the starts that did not fall, over the commanded one."""
+    speed = data.speed.values[np.isinf(data.fall.values)]
+    return f"{speed.min():.2f}-{speed.max():.2f}" if np.isfinite(speed).any() else "-"
 
 
 def _in_words(key: str, value: Any) -> str:

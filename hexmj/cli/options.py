@@ -32,6 +32,7 @@ CONTROLLER = (
 """How controllers are named."""
 
 TYPES = {int: "INT", float: "FLOAT", str: "TEXT", Path: "PATH"}
+METAVARS = {"controller": "NAME", "observation_time": "TIME"}
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,14 @@ class Output:
 
     json: bool = False
     """Print one JSON object and nothing else on standard output."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """Where the results of a study are written."""
+
+    out: Path = Path("results")
+    """Folder for figures, NetCDF, manifest and cached results."""
 
 
 @dataclass(frozen=True)
@@ -217,9 +226,8 @@ def controller(given: SimpleNamespace, name: str) -> Controller:
         from hexmj.controllers.cruse1998 import Cruse1998
 
         if not isinstance(found, Cruse1998):
-            raise InputError(
-                f"--{next(iter(rules)).replace('_', '-')} has no effect on {name}; only the 1998 network has it"
-            )
+            option = next(iter(rules)).replace("_", "-")
+            raise InputError(f"--{option} has no effect on {name}; only the 1998 network has it")
         found = replace(found, **rules)
     if getattr(given, "feedback", False):
         from hexmj.controllers.feedback import SensoryFeedback
@@ -291,40 +299,30 @@ def _default(member: Any, usual: Any = MISSING) -> Any:
 
 def _member(option: Option, texts: Mapping[str, str], *markers: Any) -> Any:
     """Return an option as `make_dataclass` takes it: name, annotated type and default."""
-    kind, default, several = option.kind, option.default, False
+    name, kind, default = option.name, option.kind, option.default
     if kind is Controller:
         kind, default = str, "ldvs" if default is MISSING else default
     elif kind is Geometry:
-        kind, default = Literal[*GEOMETRIES], next(name for name, one in GEOMETRIES.items() if one == default)
-    elif get_origin(kind) is not None and issubclass(_origin(kind), Mapping):
-        kind = tuple[str, ...]
-    parts = [part for part in get_args(kind) if part is not NoneType] if NoneType in get_args(kind) else [kind]
-    inner = parts[0]
-    if get_origin(inner) and issubclass(_origin(inner), Sequence):
-        inner, several = get_args(inner)[0], True
-    metavar = "{" + ",".join(get_args(inner)) + "}" if get_origin(inner) is Literal else TYPES.get(inner)
-    if option.name == "controller":
-        metavar = "NAME"
-    elif option.name == "observation_time":
-        kind, metavar = float | str, "TIME"
+        kind, default = Literal[*GEOMETRIES], next(one for one, lines in GEOMETRIES.items() if lines == default)
+    elif name == "observation_time":
+        kind = float | str
+    optional = NoneType in get_args(kind)
+    inner = next(part for part in get_args(kind) if part is not NoneType) if optional else kind
+    several = get_origin(inner) in (tuple, Sequence, Mapping)
+    text = texts.get(name, "")
     if several:
-        kind = tuple[inner, ...] if len(parts) == 1 and NoneType not in get_args(kind) else tuple[inner, ...] | None
-        metavar = f"{metavar} ..."
-        default = tuple(default) if default is not None and default is not MISSING else default
-    text = texts.get(option.name, "")
-    if option.name == "controller":
+        inner = get_args(inner)[0]
+        kind = tuple[inner, ...] | None if optional else tuple[inner, ...]
+        default = default if default is None or default is MISSING else tuple(default)
+    if name == "controller":
         text = f"{text} {'Each is' if several else 'It is'} {CONTROLLER}.".strip()
+    choices = "{" + ",".join(map(str, get_args(inner))) + "}" if get_origin(inner) is Literal else None
+    metavar = METAVARS.get(name) or choices or TYPES.get(inner, "")
+    metavar = f"{metavar} ..." if several else metavar
     hint: Any = {"help_behavior_hint": ""} if default is None or default is False or default == () else {}
-    about: Any = arg(
-        name=option.name.replace("_", "-"), help=text, metavar=f"[{metavar}]" if markers else metavar, **hint
-    )
+    hint |= {"metavar": f"[{metavar}]" if markers else metavar} if metavar else {}
     made = field() if default is MISSING else field(default=default)
-    return option.name, Annotated[kind, about, *markers], made
-
-
-def _origin(kind: Any) -> type:
-    origin = get_origin(kind)
-    return origin if isinstance(origin, type) else object
+    return name, Annotated[kind, arg(name=name.replace("_", "-"), help=text, **hint), *markers], made
 
 
 def _texts(*settings: type) -> dict[str, str]:
@@ -337,7 +335,7 @@ def _texts(*settings: type) -> dict[str, str]:
                 match statement, text:
                     case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
                         texts[NAMES.get(name, name)] = " ".join(words.split())
-    return texts | {
+    return {
         "acceleration": "Accelerate from --initial-velocity with a of Eq. 11 [1 / time unit]; 0.00008 in the paper.",
         "initial_velocity": "V_r(0) when accelerating, a fraction of V_p; 0.1 by default.",
-    }
+    } | texts

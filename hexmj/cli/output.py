@@ -1,13 +1,21 @@
 """Tables, lines and JSON that the commands print."""
 
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
+
+Column = Callable[["xr.Dataset"], str]
+"""Text of a table's cell, from the data of its row."""
+
+HEADS = {"velocity": "V", "vp": "V_p", "leg_mass": "legs", "mechanism_name": "starts that"}
+"""Axis of a result -> its heading in tables."""
 
 GAP = 2
 """Columns of the screen between those of a table."""
@@ -58,6 +66,36 @@ def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iter
         used += GAP + own
     for part in parts:
         yield table([head[column] for column in part], [[row[column] for column in part] for row in rows])
+
+
+def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column]) -> "Table":
+    """Return a table with a row for each label of some axes.
+
+    Args:
+        result: the data.
+        axes: the last one varies fastest.
+        columns: heading -> text of the data in a row.
+    """
+    rows = []
+    for labels in product(*(result[axis].values.tolist() for axis in axes)):
+        data = result.sel(dict(zip(axes, labels, strict=True)))
+        names = (f"{label:g}" if isinstance(label, float) else label.replace("_", " ") for label in labels)
+        rows.append((*names, *(text(data) for text in columns.values())))
+    return table((*(HEADS.get(axis, axis) for axis in axes), *columns), rows)
+
+
+def over_velocity(result: "xr.Dataset", text: Column) -> dict[str, Column]:
+    """Return columns for `grid`, one for each velocity."""
+
+    def column(v: float) -> Column:
+        return lambda data: text(data.sel(velocity=v))
+
+    return {f"V = {v:g}": column(v) for v in result.velocity.values}
+
+
+def intervals(names: Iterable[str]) -> dict[str, Column]:
+    """Return columns for `grid`, each a frequency with its interval."""
+    return {name: partial(interval, measure=name) for name in names}
 
 
 def interval(data: "xr.Dataset", measure: str) -> str:

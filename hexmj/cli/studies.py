@@ -1,14 +1,14 @@
 """`hexmj map`, `hexmj disturb`, `hexmj terrain`, `hexmj converge` and `hexmj biology`."""
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from hexmj.cli.command import StudyCommand
-from hexmj.cli.output import difference, interval, lists_of, table
+from hexmj.cli.output import Column, difference, grid, interval, intervals, lists_of, over_velocity, table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,25 +35,12 @@ OFF = {
 """Heading -> the distance of the walk from its plan."""
 
 
-def results(name: str, data: str = "") -> type:
-    """Return a dataclass with the option --out, by default results/NAME."""
-
-    @dataclass(frozen=True)
-    class Results:
-        out: Path = Path("results") / name
-        """Folder for figure, NetCDF, manifest and cached results."""
-
-    return Results
-
-
 class Map(StudyCommand):
     """Map the physical FLSS over the velocity and one condition, with the mechanisms by which starts fall or do not. A
     run that was stopped resumes if it is repeated."""
 
     study = "studies.stability_map:StabilityMap"
-    own = (results("map"),)
     hidden = ("feedback",)
-    doing = "mapping"
     data = "{over}.nc"
     figures = {"{over}": "map", "{over}-mechanisms": "mechanisms"}  # noqa: RUF012
     manifest = "{over}-manifest.json"
@@ -68,30 +55,22 @@ class Map(StudyCommand):
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.measures.compare import MEASURES
 
-        measures, changes, mechanisms = [], [], []
-        for value in result.value.values:
-            for v in result.velocity.values:
-                data, at = result.sel(value=value, velocity=v), (f"{value:g}", f"{v:g}")
-                measures.append((*at, f"{data.froude.item():.2g}", *(interval(data, name) for name in MEASURES)))
-                saved = interval(data, "saved") if data.static.item() else "none lost"
-                changes.append(
-                    (*at, f"{data.static.item():.3f}", saved, difference(data, "dynamics"), difference(data, "change"))
-                )
-        for v in result.velocity.values:
-            for name in result.mechanism_name.values:
-                counts = result["count"].sel(velocity=v, mechanism_name=name).values
-                mechanisms.append((f"{v:g}", name.replace("_", " "), *map(str, counts)))
-            toppled = (result.topple.sel(velocity=v) < float("inf")).sum("start")
-            mechanisms.append((f"{v:g}", "toppled, of all", *map(str, toppled.values)))
+        saved = {"static": lambda data: f"{data.static.item():.3f}", "saved": _saved}
+        changes = {name: partial(difference, measure=name) for name in ("dynamics", "change")}
+        counts = {f"{value:g}": _count(value) for value in result.value.values}
         yield f"{study.controller.name} over {study.over}: FLSS, with 95 % intervals; physical: falls"
-        yield table(("value", "V", "Froude", *MEASURES), measures)
+        froude = {"Froude": lambda data: f"{data.froude.item():.2g}"}
+        yield grid(result, ("value", "velocity"), froude | intervals(MEASURES))
         yield (
             "Saved: of the starts with a static loss, those that do not fall; dynamics: physical less static FLSS;"
             f" change: physical FLSS less that at {study.over} = {result.attrs['reference']:g}"
         )
-        yield table(("value", "V", "static", "saved", "dynamics", "change"), changes)
-        yield f"Mechanisms, and how many toppled: numbers of starts at each {study.over}"
-        yield table(("V", "starts that", *(f"{value:g}" for value in result.value.values)), mechanisms)
+        yield grid(result, ("value", "velocity"), saved | changes)
+        yield f"Mechanisms: numbers of starts at each {study.over}"
+        yield grid(result, ("velocity", "mechanism_name"), counts)
+        toppled = (result.topple < float("inf")).sum("start").to_dataset(name="count")
+        yield "Starts that toppled"
+        yield grid(toppled, ("velocity",), counts)
         stand = (f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True))
         yield (
             f"{result.sizes['start']} of {study.n_starts} starts, which stand on six feet and reach nine of ten tips at"
@@ -99,13 +78,19 @@ class Map(StudyCommand):
         )
 
 
+def _saved(data: "xr.Dataset") -> str:
+    return interval(data, "saved") if data.static.item() else "none lost"
+
+
+def _count(value: float) -> Column:
+    return lambda data: str(data["count"].sel(value=value).item())
+
+
 class Disturb(StudyCommand):
     """Disturb walks by a halt, a stopped leg or a push, and measure what three strategies gain, kinematically and
     physically. A run that was stopped resumes if it is repeated."""
 
     study = "studies.disturbance:DisturbedWalks"
-    own = (results("disturb"),)
-    doing = "disturbing walks"
     data = "disturb.nc"
     figures = {"disturb": "disturb"}  # noqa: RUF012
     examples = ("--kinematic --velocity 0.5", "--disturbances push --impulses 40 --strategies grasp")
@@ -146,12 +131,14 @@ def _disturbed(result: "xr.Dataset", measure: str) -> "Iterable[str | Table]":
 
 def _cases(result: "xr.Dataset", name: str, text: "Callable[[xr.Dataset, str], str]") -> "Table":
     """Return a table with a row for each case, and a column for each velocity."""
-    rows = []
-    for case in range(result.sizes["case"]):
-        row = result.isel(case=case)
-        cells = (text(row.sel(velocity=v), name) for v in result.velocity.values)
-        rows.append((row.disturbance.item(), row.strategy.item().replace("_", " "), *cells))
-    return table(("disturbance", "strategy", *(f"V = {v:g}" for v in result.velocity.values)), rows)
+    columns = {"disturbance": lambda data: data.disturbance.item(), "strategy": _strategy}
+    columns |= over_velocity(result, lambda data: text(data, name))
+    rows = [[column(result.isel(case=case)) for column in columns.values()] for case in range(result.sizes["case"])]
+    return table(columns, rows)
+
+
+def _strategy(data: "xr.Dataset") -> str:
+    return data.strategy.item().replace("_", " ")
 
 
 class Terrain(StudyCommand):
@@ -159,8 +146,6 @@ class Terrain(StudyCommand):
     stopped resumes if it is repeated."""
 
     study = "studies.terrain:Terrain"
-    own = (results("terrain"),)
-    doing = "walking to obstacles"
     data = "terrain.nc"
     figures = {"terrain": "terrain"}  # noqa: RUF012
     examples = ("--velocity 0.4 --starts 10", "--grounds step --heights 2 4 --grasps 0 1 --controller wilson")
@@ -169,19 +154,15 @@ class Terrain(StudyCommand):
         return lists_of(result[["flss", "flss_low", "flss_high", "reached", "crossed"]])
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        rows = []
-        for name in result.obstacle.values:
-            for grasp in result.grasp.values:
-                data = result.sel(obstacle=name, grasp=grasp)
-                frequencies = (interval(data.sel(velocity=v), "flss") for v in result.velocity.values)
-                crossed = f"{data.crossed.sum().item()} of {data.reached.sum().item()}"
-                parts = data.fall_part.values[data.after.values].astype(int)
-                counts = {part: int((parts == i).sum()) for i, part in enumerate(study.conditions.body.trunk)}
-                most = sorted(counts.items(), key=lambda item: -item[1])
-                fell = ", ".join(f"{part} {n}" for part, n in most if n)
-                rows.append((name, f"{grasp:g}", *frequencies, crossed, fell))
+        def fell_on(data: "xr.Dataset") -> str:
+            parts = data.fall_part.values[data.after.values].astype(int)
+            counts = Counter(study.conditions.body.trunk[part] for part in parts)
+            return ", ".join(f"{part} {number}" for part, number in counts.most_common())
+
+        columns = over_velocity(result, partial(interval, measure="flss"))
+        columns["crossed"] = lambda data: f"{data.crossed.sum().item()} of {data.reached.sum().item()}"
         yield "FLSS once the obstacle has been reached, with 95 % intervals; earlier falls do not count"
-        yield table(("obstacle", "grasp", *(f"V = {v:g}" for v in result.velocity.values), "crossed", "fell on"), rows)
+        yield grid(result, ("obstacle", "grasp"), columns | {"fell on": fell_on})
         yield f"commanded distance {result.attrs['distance']:g} mm"
 
 
@@ -190,8 +171,6 @@ class Converge(StudyCommand):
     static criterion. A run that was stopped resumes if it is repeated."""
 
     study = "studies.static_limit:StaticLimit"
-    own = (results("converge"),)
-    doing = "walking slower and slower"
     data = "converge.nc"
     figures = {"converge": "converge"}  # noqa: RUF012
     examples = ("--velocity 0.5 --starts 20", "--vps 200 50 --leg-masses 1 --controller hws")
@@ -202,17 +181,17 @@ class Converge(StudyCommand):
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.studies.static_limit import LOSSES
 
-        means = _means(result)
+        means, axes = _means(result), ("leg_mass", "vp")
         yield f"V = {study.velocity:g}: FLSS, with 95 % intervals; physical: falls"
-        yield _limits(means, {measure: partial(interval, measure=measure) for measure in LOSSES})
+        yield grid(means, axes, intervals(LOSSES))
         yield "Starts with the kinematic answer; steps in which the planned feet stand, or are at the ground"
-        yield _limits(means, {heading: partial(_number, name=name) for heading, name in SAME.items()})
+        yield grid(means, axes, {heading: partial(_number, name=name) for heading, name in SAME.items()})
         yield (
             "Distances from the planned margin until the plan loses stability: of the measured one, of that with all"
             " feet at the ground, of the centre of pressure's, of the measured one while the same feet stand; of the"
             " centre of mass from O [mm]; slip [mm/s] and tracking [mm] to the end"
         )
-        yield _limits(means, {heading: partial(_number, name=name) for heading, name in OFF.items()})
+        yield grid(means, axes, {heading: partial(_number, name=name) for heading, name in OFF.items()})
 
 
 def _means(result: "xr.Dataset") -> "xr.Dataset":
@@ -220,16 +199,6 @@ def _means(result: "xr.Dataset") -> "xr.Dataset":
     from hexmj.studies.static_limit import LOSSES
 
     return result.drop_vars(LOSSES.values()).mean("start", keep_attrs=True)
-
-
-def _limits(means: "xr.Dataset", columns: Mapping[str, "Callable[[xr.Dataset], str]"]) -> "Table":
-    """Return a table with a row for each mass of the legs and V_p."""
-    rows = [
-        (f"{mass:g}", f"{vp:g}", *(column(means.sel(leg_mass=mass, vp=vp)) for column in columns.values()))
-        for mass in means.leg_mass.values
-        for vp in means.vp.values
-    ]
-    return table(("legs", "V_p", *columns), rows)
 
 
 def _number(data: "xr.Dataset", name: str) -> str:
@@ -241,8 +210,6 @@ class Biology(StudyCommand):
     was stopped resumes if it is repeated."""
 
     study = "studies.biology:Biology"
-    own = (results("biology"),)
-    doing = "walking beside the animal"
     data = "biology.nc"
     figures = {"biology": "biology"}  # noqa: RUF012
     examples = ("--starts 5", "--controller walknet --vp 120 --out results/walknet")
