@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from hexmj.cli.command import Command, StudyCommand
-from hexmj.cli.measures import PHYSICAL, Start
+from hexmj.cli.measures import PHYSICAL
 from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules, no_effect
 from hexmj.cli.output import interval, print_json, report_checks, show, table, tables_that_fit
 from hexmj.errors import InputError, RenderingError, SimulationError
@@ -95,6 +95,7 @@ class League(StudyCommand):
 def _film(given: SimpleNamespace, result: "xr.Dataset") -> Path:
     """Film the best entrants in physics side by side, from the first random start."""
     from hexmj.replay.film import Film
+    from hexmj.replay.recording import Start
     from hexmj.replay.video import render
     from hexmj.studies.standings import by_rank
 

@@ -29,7 +29,6 @@ from hexmj.cli.output import (
     four_digits,
     grid,
     intervals,
-    physical_report,
     print_json,
     report_line,
     show,
@@ -38,12 +37,10 @@ from hexmj.cli.output import (
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
-from hexmj.timing import Acceleration, Stride, observation_duration
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hexmj.measures.physical import PhysicalWalk
 
 PHYSICAL = tuple(member.name for member in fields(Conditions) if member.name != "body")
 """Conditions, in the order of their fields."""
@@ -53,88 +50,6 @@ FOOT_PATH = ("vp", "step_height", "standing_height", "lift_time", "landing_time"
 
 TIMES = ("planned loss", "measured loss", "fall")
 """Events of a walk, which may not happen."""
-
-
-@dataclass(frozen=True)
-class Start:
-    """One walk from a random start."""
-
-    controller: Controller
-    velocity: float = 0.3
-    """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
-    seed: int = 0
-    """Seed of the random starts."""
-    start: int = 0
-    """Number of the start among the random starts of the seed."""
-    observation_time: str | float = "walk"
-    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
-    stride: Stride = Stride()
-    acceleration: Acceleration | None = None
-    conditions: Conditions = Conditions()
-
-    @property
-    def how(self) -> dict[str, Any]:
-        """Stride and acceleration, as arguments of walks."""
-        return {"stride": self.stride, "acceleration": self.acceleration}
-
-    @property
-    def drawn(self) -> Any:
-        """The start, (1, leg) [mm], the controller, the velocity and the duration [time units]."""
-        from hexmj.starts import draw_start
-
-        time = observation_duration(self.observation_time, self.velocity, self.stride, self.acceleration)
-        return draw_start(self.start, self.seed, self.stride), self.controller, self.velocity, float(time)
-
-    def walked(self, threads: int | None = None) -> "PhysicalWalk":
-        """Return the physical walk."""
-        from hexmj.measures.physical import physical_walk
-        from hexmj.progress import progress_bar
-
-        with progress_bar("walking") as progress:
-            how: Any = self.how | {"conditions": self.conditions, "progress": progress, "threads": threads}
-            return physical_walk(*self.drawn, **how)
-
-    def recorded(self, physical: bool, title: str, threads: int | None = None) -> "xr.Dataset":
-        """Return a recording of the physical walk, or of the plan."""
-        from hexmj.replay.recording import record, record_plan
-
-        if physical:
-            return record(self.walked(threads), title=title)
-        from hexmj.measures.kinematic import walk
-
-        return record_plan(walk(*self.drawn, **self.how, threads=threads), self.conditions, self.stride, title=title)
-
-    def settings(self, **controllers: Controller) -> dict[str, Any]:
-        """Return what is needed to repeat the walk, as plain data."""
-        from hexmj.measures.tables import settings
-
-        walks = settings(controllers, self.observation_time, 1, self.seed, self.stride, self.acceleration)
-        own = {"velocity": self.velocity, "start": self.start}
-        return own | walks | {"conditions": self.conditions.settings()}
-
-
-def walk_summary(walked: "xr.Dataset") -> dict[str, Any]:
-    """Return when a recorded walk lost stability or fell [time units], and its least margins [mm]."""
-    from hexmj.measures.compare import REPORTED
-    from hexmj.replay.recording import recorded_conditions
-
-    summary: dict[str, Any] = {
-        "time units": float(walked.time[-1]),
-        "planned loss": float(walked.planned_loss_time),
-        "least planned margin [mm]": float(walked.planned_margin.min()),
-    }
-    if "measured_margin" in walked:
-        part = int(walked.fall_part)
-        summary |= {
-            "measured loss": float(walked.measured_loss_time),
-            "least measured margin [mm]": float(walked.measured_margin.min()),
-            "fall": float(walked.fall_time),
-            "fell on": recorded_conditions(walked).body.trunk[part] if part >= 0 else None,
-        }
-        for name in REPORTED:
-            unit = walked[name].attrs["units"]
-            summary[f"{name} [{unit}]" if unit != "1" else name] = walked[name].item()
-    return summary
 
 
 @dataclass(frozen=True)
@@ -151,12 +66,12 @@ class Walk(Command):
     """Walk once, kinematically or physically, and write a recording (NetCDF) and a figure with the footfall diagram
     and the stability margin."""
 
-    sources = (WalkOptions, Start, Output, Planning, Threads, Figures)
+    sources = (WalkOptions, "replay.recording:Start", Output, Planning, Threads, Figures)
     examples = ("--velocity 0.5", "--controller wilson --physical --seed 7 --json")
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.io import MANIFEST, attributes, results_folder, save_manifest
-        from hexmj.replay.recording import save_recording
+        from hexmj.replay.recording import Start, recording_summary, save_recording
 
         if not given.physical:
             no_effect(given, [*(set(PHYSICAL) - {*FOOT_PATH}), "feedback"], "without --physical")
@@ -166,7 +81,7 @@ class Walk(Command):
         settings = start.settings(**{given.controller: start.controller}) | {"physical": given.physical}
         files = [save_recording(walked, out / "recording.nc"), draw(walked, out / f"walk.{given.format}")]
         files.append(save_manifest(given.command, settings, files, out / MANIFEST))
-        summary = walk_summary(walked)
+        summary = recording_summary(walked)
         if given.json:
             print_json(summary | {"settings": settings, "searched": searched(given), "files": files})
         else:
@@ -190,18 +105,19 @@ class FlssOptions:
     """Count falls of the insect in MuJoCo instead of losses of the planned stability."""
     range_of: int | None = None
     """Starts that are computed and cached as one cell, by default 1600000; no result depends on it."""
+    conditions: Conditions = Conditions()
 
 
 class Flss(Command):
     """Measure the FLSS of a controller over velocities, kinematic or physical. A run with --out that was stopped
     resumes if it is repeated."""
 
-    sources = (FlssOptions, "measures.kinematic:KinematicFlss", Start, Output, Planning, Workers, Figures)
-    hidden = ("start",)
+    sources = (FlssOptions, "measures.kinematic:KinematicFlss", Output, Planning, Workers, Figures)
     examples = ("--velocity 0.5", "--physical --velocity 0.3 0.5 --starts 50 --out results/flss")
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.io import MANIFEST, attributes, results_folder, save, save_manifest, settings
+        from hexmj.measures.compare import physical_report
 
         if not given.physical:
             no_effect(given, [*PHYSICAL, "feedback"], "without --physical")
@@ -274,7 +190,7 @@ class Compare(StudyCommand):
         """Write a recording of the first controller near V = 0.3, from a start that stays stable, and its video."""
         import numpy as np
 
-        from hexmj.replay.recording import save_recording
+        from hexmj.replay.recording import Start, save_recording
         from hexmj.replay.video import render
 
         if given.no_video:
@@ -295,7 +211,7 @@ class Compare(StudyCommand):
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         from hexmj.io import settings
-        from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES
+        from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, physical_report
 
         summary: dict[str, Any] = {"velocity": result.velocity.values.tolist()}
         keys = [measure + end for measure in MEASURES | BESIDE for end in ("", "_low", "_high")]
@@ -306,7 +222,7 @@ class Compare(StudyCommand):
         return summary | {"report": physical_report(result), "settings": settings(result) | durations}
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES
+        from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, physical_report
 
         axes, names = ("controller", "velocity"), ("both", "kin.", "phys.", "none")
         columns: dict[str, Column] = {"t": lambda data: four_digits(data.duration.item())}

@@ -122,19 +122,6 @@ def lists_of(result: "xr.Dataset") -> dict[str, Any]:
     return {str(name): result[name].values.tolist() for name in result.variables} | {"settings": settings(result)}
 
 
-def physical_report(result: "xr.Dataset") -> dict[str, float]:
-    """Return how well the bodies followed their plans, over all walks of a comparison or a physical FLSS."""
-    return {
-        "mean slip [mm/s]": result.slip.mean().item(),
-        "tracking, 95th percentile [mm]": result.tracking.mean().item(),
-        "deepest foot in the ground [mm]": result.depth.max().item(),
-        "joints at their torque limit": result.saturation.mean().item(),
-        "tip targets out of reach": result.unreachable.sum().item(),
-        "least clearance [mm]": result.clearance.min().item(),
-        "greatest tilt [rad]": result.tilt.max().item(),
-    }
-
-
 def report_line(report: dict[str, float]) -> str:
     """Return a report as one line."""
     return "; ".join(f"{key}: {value:{'.3g' if isinstance(value, float) else ''}}" for key, value in report.items())

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
 
 from hexmj.cli.command import Command
-from hexmj.cli.measures import PHYSICAL, Start, walk_summary
+from hexmj.cli.measures import PHYSICAL
 from hexmj.cli.options import Output, Planning, Threads, build, controller, no_effect
 from hexmj.cli.output import print_json, show
 from hexmj.conditions import Conditions
@@ -19,6 +19,8 @@ from hexmj.timing import Stride
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from hexmj.replay.recording import Start
 
 WALKS: dict[str, Any] = {"controller": "ldvs", "velocity": 0.3, "seed": 0, "start": 0, "beside": None}
 """Defaults of options that have no effect on recordings."""
@@ -44,13 +46,13 @@ class RenderOptions:
 class Render(Command):
     """Render a gait video, from recordings or from a walk that is recorded first."""
 
-    sources = (RenderOptions, Start, Output, Film, Planning, Threads)
+    sources = (RenderOptions, "replay.recording:Start", Output, Film, Planning, Threads)
     positional = "recordings"
     examples = ("results/walk/recording.nc --camera side", "--controller wilson --velocity 0.5 --beside planned")
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.io import MANIFEST, results_folder, save_manifest
-        from hexmj.replay.recording import load_recording, save_recording
+        from hexmj.replay.recording import Start, load_recording, recording_summary, save_recording
         from hexmj.replay.video import missing, render
 
         film = build(Film, given)
@@ -80,14 +82,14 @@ class Render(Command):
         files.append(save_manifest(given.command, settings, files, out / f"{video.name}-{MANIFEST}"))
         if given.json:
             summary = {"frames": frames, "film": asdict(film), "files": files}
-            print_json(summary | {"recordings": [walk_summary(walked) for walked in shown]})
+            print_json(summary | {"recordings": [recording_summary(walked) for walked in shown]})
         else:
             show(f"{frames} frames at {film.fps:g} per second", *map(str, files))
 
 
-def _recorded(start: Start, given: SimpleNamespace) -> "list[xr.Dataset]":
+def _recorded(start: "Start", given: SimpleNamespace) -> "list[xr.Dataset]":
     """Return the recordings of the walk and of what is shown beside it."""
-    from hexmj.replay.recording import record, record_plan
+    from hexmj.replay.recording import Start, record, record_plan
 
     name, walked = start.controller.name, start.walked(given.threads)
     shown = [record(walked, title=name)]
@@ -128,7 +130,7 @@ class Page(Command):
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.io import MANIFEST, results_folder, save_manifest
         from hexmj.replay.page import page
-        from hexmj.replay.recording import load_recording
+        from hexmj.replay.recording import load_recording, recording_summary
 
         if not 1 <= len(given.recordings) <= 2:
             raise InputError(f"{len(given.recordings)} recordings; expected 1 or 2, such as recording.nc of hexmj walk")
@@ -138,7 +140,7 @@ class Page(Command):
         settings = {"recordings": [str(path) for path in given.recordings]}
         files.append(save_manifest(given.command, settings, files, out / f"walk.html-{MANIFEST}"))
         if given.json:
-            print_json({"files": files, "recordings": [walk_summary(walked) for walked in shown]})
+            print_json({"files": files, "recordings": [recording_summary(walked) for walked in shown]})
         else:
             show(f"{files[0].stat().st_size / 1e6:.1f} MB; opens in any browser", *map(str, files))
 

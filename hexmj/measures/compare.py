@@ -187,3 +187,16 @@ def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr
     same = (data.planned_loss < np.inf) == (data.fall < np.inf)
     new["agreement"] = same.mean("start").assign_attrs(units="1", long_name="kinematic and physical answer agree")
     return data.assign(new)
+
+
+def physical_report(result: "xr.Dataset") -> dict[str, float]:
+    """Return how well the bodies followed their plans, over all walks of a comparison or a physical FLSS."""
+    return {
+        "mean slip [mm/s]": result.slip.mean().item(),
+        "tracking, 95th percentile [mm]": result.tracking.mean().item(),
+        "deepest foot in the ground [mm]": result.depth.max().item(),
+        "joints at their torque limit": result.saturation.mean().item(),
+        "tip targets out of reach": result.unreachable.sum().item(),
+        "least clearance [mm]": result.clearance.min().item(),
+        "greatest tilt [rad]": result.tilt.max().item(),
+    }

@@ -1,6 +1,6 @@
 """Recordings: one start of a walk as a file, with everything that figures, films and pages need."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +11,20 @@ from hexmj.bodies.kinematics import standing_tips
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
 from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.files import read_netcdf, write_netcdf
 from hexmj.legs import LEGS
+from hexmj.measures import tables
 from hexmj.measures.compare import REPORTED
-from hexmj.measures.physical import PhysicalWalk
+from hexmj.measures.kinematic import walk as planned_walk
+from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.physics.foot_path import TipTargets, hold
+from hexmj.progress import progress_bar
 from hexmj.rotations import rotated
 from hexmj.stability import loss_time, walk_margin
-from hexmj.timing import Stride
+from hexmj.starts import draw_start
+from hexmj.timing import Acceleration, Stride, observation_duration
 from hexmj.walks import PlannedWalk, one_start
 
 _STEP, _LEG, _ONCE = ("step",), ("step", "leg"), ()
@@ -61,6 +66,55 @@ MEASURED = {
     "unreachable": (_ONCE, "1", "tip targets out of reach"),
 }
 """Variables of a physical walk. A puppet, which only shows the plan, has none of them."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """One walk from a random start."""
+
+    controller: Controller
+    velocity: float = 0.3
+    """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
+    seed: int = 0
+    """Seed of the random starts."""
+    start: int = 0
+    """Number of the start among the random starts of the seed."""
+    observation_time: str | float = "walk"
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    stride: Stride = Stride()
+    acceleration: Acceleration | None = None
+    conditions: Conditions = Conditions()
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """Stride and acceleration, as arguments of walks."""
+        return {"stride": self.stride, "acceleration": self.acceleration}
+
+    @property
+    def drawn(self) -> Any:
+        """The start, (1, leg) [mm], the controller, the velocity and the duration [time units]."""
+        time = observation_duration(self.observation_time, self.velocity, self.stride, self.acceleration)
+        return draw_start(self.start, self.seed, self.stride), self.controller, self.velocity, float(time)
+
+    def walked(self, threads: int | None = None) -> PhysicalWalk:
+        """Return the physical walk."""
+        with progress_bar("walking") as progress:
+            how: Any = self.how | {"conditions": self.conditions, "progress": progress, "threads": threads}
+            return physical_walk(*self.drawn, **how)
+
+    def recorded(self, physical: bool, title: str, threads: int | None = None) -> xr.Dataset:
+        """Return a recording of the physical walk, or of the plan."""
+        if physical:
+            return record(self.walked(threads), title=title)
+        return record_plan(
+            planned_walk(*self.drawn, **self.how, threads=threads), self.conditions, self.stride, title=title
+        )
+
+    def settings(self, **controllers: Controller) -> dict[str, Any]:
+        """Return what is needed to repeat the walk, as plain data."""
+        walks = tables.settings(controllers, self.observation_time, 1, self.seed, self.stride, self.acceleration)
+        own = {"velocity": self.velocity, "start": self.start}
+        return own | walks | {"conditions": self.conditions.settings()}
 
 
 def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
@@ -204,6 +258,26 @@ def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Con
         )
     defaults = Conditions().values()
     return Conditions(body=body, **{name: type(value)(recording.attrs[name]) for name, value in defaults.items()})
+
+
+def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
+    """Return when a recorded walk lost stability or fell [time units], its least margins [mm] and its outcomes."""
+    summary: dict[str, Any] = {
+        "time units": float(recording.time[-1]),
+        "planned loss": float(recording.planned_loss_time),
+        "least planned margin [mm]": float(recording.planned_margin.min()),
+    }
+    if "measured_margin" not in recording:
+        return summary
+    part = int(recording.fall_part)
+    summary["measured loss"] = float(recording.measured_loss_time)
+    summary["least measured margin [mm]"] = float(recording.measured_margin.min())
+    summary["fall"] = float(recording.fall_time)
+    summary["fell on"] = recorded_conditions(recording).body.trunk[part] if part >= 0 else None
+    for name in REPORTED:
+        unit = recording[name].attrs["units"]
+        summary[f"{name} [{unit}]" if unit != "1" else name] = recording[name].item()
+    return summary
 
 
 def _stride_settings(stride: Stride) -> dict[str, Any]:
