@@ -129,14 +129,6 @@ def test_invalid_files_are_refused(tmp_path, text):
         load_controller(str(path))
 
 
-def test_names_of_controllers(tmp_path):
-    """As in tables and titles: that of a preset, and of a file without its folder and ending."""
-    path = tmp_path / "found-0.1.toml"
-    path.write_text(network_toml(HWS))
-    names = ("hws", "own-0.1", str(path))
-    assert [load_controller(name).name for name in names] == ["hws", "own-0.1", "found-0.1"]
-
-
 def weights_with(**changed: np.ndarray) -> Weights:
     return Weights(**{kind: np.zeros((6, 6)) for kind in NEIGHBOURS} | changed)
 
@@ -164,13 +156,6 @@ def weights_with(**changed: np.ndarray) -> Weights:
 def test_invalid_settings_are_refused(name, make):
     with pytest.raises(InputError, match=name):
         make()
-
-
-def test_weights_copy_their_input():
-    matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-    weights = Weights(**matrices)
-    matrices["p1"][0, 1] = 3.0
-    assert not weights.p1.any()
 
 
 @pytest.mark.slow
