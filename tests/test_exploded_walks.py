@@ -159,11 +159,3 @@ def test_a_state_that_diverged_says_so_again(tmp_path, capsys):
             walked(settled)
         divergence.main(str(divergence.save_state(error.value, tmp_path)))
     assert capsys.readouterr().out.startswith("it diverged: mjWARN")
-
-
-@pytest.mark.parametrize("height", [0.0001, 0.099])
-def test_bumps_so_flat_that_a_foot_stands_on_dozens_are_refused(height: float):
-    with pytest.raises(InputError):
-        Conditions(ground="rough", ground_height=height)
-    assert Conditions(ground="rough", ground_height=0.1).highest_ground == 0.1
-    assert Conditions(ground="step", ground_height=height).highest_ground == height

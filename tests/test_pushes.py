@@ -2,6 +2,7 @@
 
 from contextlib import nullcontext
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,11 +15,10 @@ from hexmj.controllers.planning import begin
 from hexmj.errors import InputError
 from hexmj.measures.physical import outcomes_of_plan
 from hexmj.physics.outcomes import Outcomes
-from hexmj.physics.pushes import Push
+from hexmj.physics.pushes import Push, can_push
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import settle
 from hexmj.starts import draw_starts
-from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.timing import Stride
 from tiers import few_of
 
@@ -43,36 +43,6 @@ def test_a_push_gives_the_momentum_asked_for(vp):
         speed.append((y[:, -1] - y[:, -40]) / 39 / settled.compiled.model.opt.timestep)  # mm/s
     assert_allclose((speed[1] - speed[0])[:2] * STICK_INSECT.mass, [30.0, -30.0], rtol=0.02)
     assert speed[1][2] == speed[0][2]
-
-
-@pytest.mark.parametrize("time", [-1.0, 3.1, 5.0, 1e9])
-def test_a_push_that_is_not_all_within_the_walk_is_refused(time):
-    """Whose steps end at 5, though it is told to take 5.05; a push lasts 2."""
-    settled = settle(draw_starts(2, 0))
-    for impulse, refused in ((0.0, False), (100.0, True)):
-        push = Push(np.array([0.0, impulse]), np.array([0.0, time]))
-        chunks = drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.05, push=push)
-        said = pytest.raises(InputError)
-        with said if refused else nullcontext():
-            list(chunks)
-    assert list(
-        drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.05, push=Push(np.ones(2), np.full(2, 3.0)))
-    )
-
-
-@pytest.mark.parametrize("name", ["impulse", "time"])
-def test_a_push_is_finite(name):
-    for wrong in (np.nan, np.inf):
-        with pytest.raises(InputError):
-            Push(**{"impulse": np.zeros(2), "time": np.zeros(2), name: np.array([0.0, wrong])})
-
-
-@pytest.mark.parametrize("wrong", [np.ones(1), np.array(1.0), [1.0, 2.0], "hard"], ids=repr)
-def test_a_push_is_of_all_starts(settled, wrong):
-    n_starts = len(settled.starts)
-    with pytest.raises(InputError):
-        push = Push(wrong, np.zeros(n_starts))
-        list(drive(settled, begin(LDVS, settled.starts, 0.3, settled.stride), 4.0, push=push))
 
 
 def test_a_push_lasts_as_long_whatever_the_physics_step():
@@ -124,15 +94,33 @@ def test_a_push_depends_on_no_start_beside(vp):
             assert getattr(alone, one.name).tobytes() == getattr(together, one.name)[[n]].tobytes(), one.name
 
 
-@pytest.mark.parametrize(("vp", "dt", "told"), [(8.0, 1.0, "125 ms"), (20.0, 1.0, "50 ms"), (21.0, 1.0, None)])
-def test_steps_in_which_no_push_fits_are_refused(vp, dt, told):
-    """One of 25 ms, to the nearest step; who pushes nobody is told nothing."""
-    conditions, stride = Conditions(vp=vp), Stride(dt=dt)
-    with pytest.raises(InputError) if told else nullcontext():
-        DisturbedWalks(LDVS, conditions=conditions, stride=stride, velocities=[0.5], n_starts=2)
-    DisturbedWalks(LDVS, conditions=conditions, stride=stride, velocities=[0.5], n_starts=2, disturbances=["halt"])
+BAD: dict[str, tuple[Any, Any]] = {
+    "not finite": (np.array([0.0, np.nan]), np.zeros(2)),
+    "time not finite": (np.zeros(2), np.array([0.0, np.inf])),
+    "no numbers": ("hard", np.zeros(2)),
+    "one start": (np.ones(1), np.zeros(1)),
+    "before the walk": (np.ones(2), np.array([0.0, -1.0])),
+    "ends after the walk": (np.ones(2), np.array([0.0, 3.1])),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_pushes_that_make_no_sense_are_refused(case):
+    """A walk of 5.05 time units ends with the step at 5; a push lasts 2."""
+    settled = settle(draw_starts(2, 0))
+    with pytest.raises(InputError):
+        list(drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.05, push=Push(*BAD[case])))
+    last = Push(np.ones(2), np.full(2, 3.0))
+    assert list(drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.05, push=last))
+
+
+@pytest.mark.parametrize(("vp", "fits"), [(8.0, False), (20.0, False), (21.0, True)])
+def test_steps_of_the_plan_must_be_short_enough_for_a_push(vp, fits):
+    """A push lasts 25 ms, to the nearest step of the plan."""
+    conditions, stride = Conditions(vp=vp), Stride(dt=1.0)
+    assert can_push(conditions, stride) == fits
     settled = settle(draw_starts(1, 0, stride), conditions, stride)
     for impulse in (0.0, 1.0):
         push = Push(np.full(1, impulse), np.ones(1))
-        with pytest.raises(InputError) if told and impulse else nullcontext():
+        with nullcontext() if fits or not impulse else pytest.raises(InputError):
             list(drive(settled, begin(LDVS, settled.starts, 0.5, stride), 4.0, push=push))
