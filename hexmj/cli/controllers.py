@@ -63,10 +63,8 @@ class League(StudyCommand):
 
         names = (FOUR if given.quick else EVERYONE) if given.controller is None else given.controller
         distinct("--controller", names)
-        given.entrants, given.controller = (
-            entrants(names),
-            list(dict.fromkeys(name.removesuffix(IDEAL) for name in names)),
-        )
+        given.entrants = entrants(names)
+        given.controller = list(dict.fromkeys(name.removesuffix(IDEAL) for name in names))
         asked = {"velocities": given.velocity, "n_starts": given.starts}
         asked |= {name: getattr(given, name) for name in ("physical_starts", "trial_starts")}
         sizes = (QUICK if given.quick else {}) | {name: size for name, size in asked.items() if size is not None}
