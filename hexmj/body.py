@@ -148,7 +148,7 @@ class Body:
     """Parts from front to rear, names of bodies and of their geoms, that fall on the ground; they carry the mass that
     is not the legs'."""
     legs: tuple[Leg, ...]
-    """The six legs in the order of `hexmj.legs.LEGS`."""
+    """The six legs in the order of `LEGS`."""
     ground: str
     """Geom of the plane on which it stands."""
     home: str

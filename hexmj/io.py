@@ -11,6 +11,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.files import read_netcdf, replacing, write_netcdf, write_text
+from hexmj.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,8 +23,8 @@ TEXTS = ("study", "model", "over", "reference", "title", "body", "ground")
 MANIFEST = "manifest.json"
 """Name of the file that says how results were made, or the end of its name."""
 
-LIBRARIES = ("hexmj", "mujoco", "numpy", "scipy", "numba", "xarray", "matplotlib")
-"""Packages whose versions a manifest records."""
+LIBRARIES = ("mujoco", "numpy", "scipy", "numba", "xarray", "matplotlib")
+"""Packages whose versions a manifest records, beside hexmj and Python."""
 
 
 def load(path: Path | str) -> "xr.Dataset":
@@ -126,7 +127,8 @@ def save_manifest(command: Sequence[str], settings: Mapping[str, Any], files: Se
         files: that the command wrote, in the manifest's folder or below it.
         path: of the manifest.
     """
-    versions = {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()}
+    versions = {"hexmj": __version__} | {name: version(name) for name in LIBRARIES}
+    versions["python"] = platform.python_version()
     names = [file.relative_to(path.parent).as_posix() for file in files]
     content = {"command": list(command), "settings": dict(settings), "versions": versions, "files": names}
     return write_text(path, json_text(content) + "\n")
