@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -139,12 +138,10 @@ def test_what_no_leg_reaches_is_never_found():
         search(problem, Effort(starts=2, budget=10, refine_budget=0, domain=2.0))
 
 
-@pytest.mark.parametrize(
-    "form", [lambda: FieldsForm(Pace(good=math.nan)), lambda: FieldsForm(Pace(good=math.inf)), lambda: Switches(1.0)]
-)
-def test_boxes_that_are_not_finite_or_empty_are_refused(form: Any):
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_boxes_that_are_not_finite_are_refused(value: float):
     with pytest.raises(InputError, match="box"):
-        search(Problem(form(), 0.4, 0.4, observation_time=5.0), Effort(starts=2, budget=10))
+        FieldsForm(Pace(good=value))
 
 
 def test_controllers_without_such_parameters_are_refused():
@@ -154,33 +151,3 @@ def test_controllers_without_such_parameters_are_refused():
         with pytest.raises(InputError, match="begin"):
             FieldsForm(Picky()).vector(begin)
     assert FieldsForm(Picky()).vector(Picky(good=2.005, name="begun")).tolist() == [2.005, -0.5]
-
-
-@dataclass(frozen=True)
-class Switches:
-    """A form of a user, in which both parameters are binary."""
-
-    least: float = 0.0
-    names: tuple[str, ...] = ("good", "idle")
-    begin: None = None
-
-    @property
-    def binary(self):
-        return np.ones(2, dtype=bool)
-
-    def box(self, reach):
-        return np.full(2, self.least), np.ones(2)
-
-    def controller(self, vector):
-        return Pace(*vector.tolist())
-
-    def vector(self, controller):
-        return np.array([controller.good, controller.idle])
-
-
-def test_switches_alone_are_searched_without_a_simplex():
-    problem = Problem(Switches(), 0.4, 0.4, observation_time=5.0)
-    found = search(problem, Effort(starts=5, budget=12, population=4, refine_budget=20))
-    assert not found.history.stage.any()
-    assert found.starts == 5
-    assert set(found.vector.tolist()) <= {0.0, 1.0}

@@ -4,12 +4,10 @@ A form of the 1998 network has nine or ten numbers if all legs of a side are ali
 sides are alike (half of the 58 general weights of Section 2), or all 58. Of other controllers float fields are free.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hexmj.controllers.cruse1998 import Cruse1998, ModelVariant, Order
 from hexmj.controllers.cruse1998.weights import (
@@ -23,55 +21,27 @@ from hexmj.controllers.cruse1998.weights import (
     pairs,
 )
 from hexmj.controllers.protocol import Controller, check_controller_type
-from hexmj.controllers.registry import PART, load_controller, parameter_file
+from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.plain import plain
-from hexmj.validate import choice, numbers
+from hexmj.validate import choice
 
 FormName = Literal["hws", "ldvs", "mirrored", "general"]
 
 _ALL = [(kind, pair) for kind in NEIGHBOURS for pair in pairs(kind)]
-_LEFT = [(kind, pair) for kind, pair in _ALL if pair[0] < 3]
+_SYMMETRIC = tuple(one.name for one in fields(Symmetric))
 
+PLACES = {"mirrored": [(kind, pair) for kind, pair in _ALL if pair[0] < 3], "general": _ALL}
+"""Forms of general weights -> kind, destination and source leg of each parameter."""
 
-@runtime_checkable
-class Form(Protocol):
-    """A frozen dataclass that turns vectors into controllers."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters, in the order of the vector."""
-        ...
-
-    @property
-    def binary(self) -> np.ndarray:
-        """(parameter,) which are 0 or 1."""
-        ...
-
-    @property
-    def begin(self) -> np.ndarray | None:
-        """(parameter,) vector from which a search begins by default; None leaves it to the algorithm."""
-        ...
-
-    def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return least and greatest values of the first population, (parameter,) each.
-
-        At a reach of 1 the greater magnitude of the two is the unit of a parameter.
-        """
-        ...
-
-    def controller(self, vector: np.ndarray) -> Controller:
-        """Return the controller of a vector, (parameter,)."""
-        ...
-
-    def vector(self, controller: Controller) -> np.ndarray:
-        """Return the parameters of a controller, (parameter,).
-
-        Raises:
-            InputError: the controller does not have this form.
-        """
-        ...
+FORMS: dict[FormName, tuple[str, ...]] = {
+    "hws": tuple(name for name in _SYMMETRIC if name != "p34_i"),
+    "ldvs": _SYMMETRIC,
+    "mirrored": names_of(PLACES["mirrored"]),
+    "general": names_of(PLACES["general"]),
+}
+"""Forms of the 1998 network -> names of their parameters, in the order of the vector."""
 
 
 @dataclass(frozen=True)
@@ -88,87 +58,54 @@ class FieldsForm:
         check_controller_type(self.usual)
         if not self.names:
             raise InputError(f"{self.usual.name} has no field of the type float, which could be searched")
+        if not np.isfinite(self.begin).all():
+            raise InputError(f"box of the form: {self.usual.name} has a field that is not finite")
         if not self.name:
             kind = type(self.usual)
             object.__setattr__(self, "name", f"{kind.__module__}:{kind.__qualname__}")
 
     @property
     def names(self) -> tuple[str, ...]:
-        """See `Form.names`."""
+        """Names of the parameters, in the order of the vector."""
         controller: Any = self.usual
         return tuple(one.name for one in fields(controller) if one.init and one.type in (float, "float"))
 
     @property
     def binary(self) -> np.ndarray:
-        """See `Form.binary`; no field is."""
+        """(parameter,) which are 0 or 1: none."""
         return np.zeros(len(self.names), dtype=bool)
 
     @property
     def begin(self) -> np.ndarray:
-        """The usual values."""
+        """(parameter,) vector from which a search begins by default: the usual values."""
         return self.vector(self.usual)
 
     def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return 0 and `reach` times the usual value, or 0 and `reach` if that is 0."""
+        """Return least and greatest values of the first population, (parameter,) each.
+
+        They are 0 and `reach` times the usual value, or 0 and `reach` if that is 0.
+        """
         ends = reach * np.where(self.begin == 0, 1.0, self.begin)
         return np.minimum(0.0, ends), np.maximum(0.0, ends)
 
     def controller(self, vector: np.ndarray) -> Controller:
-        """See `Form.controller`."""
+        """Return the controller of a vector, (parameter,)."""
         controller: Any = self.usual
-        return replace(controller, **dict(zip(self.names, _parameters(vector, self.names).tolist(), strict=True)))
+        return replace(controller, **dict(zip(self.names, vector.tolist(), strict=True)))
 
     def vector(self, controller: Controller) -> np.ndarray:
-        """See `Form.vector`."""
-        usual, other = self.usual, controller
-        if type(other) is not type(usual):
-            raise InputError(f"begin = {other.name}; expected a {type(usual).__name__}, which is searched")
-        kept = [one.name for one in fields(usual) if one.init and one.name not in (*self.names, "name")]  # pyright: ignore
-        if different := [name for name in kept if plain(getattr(other, name)) != plain(getattr(usual, name))]:
-            raise InputError(f"begin = {other.name} has another {different[0]} than the controller that is searched")
-        return np.array([float(getattr(other, name)) for name in self.names])
+        """Return the parameters of a controller, (parameter,).
 
-
-class _Weights(NamedTuple):
-    """The meaning of a network form's vector."""
-
-    names: tuple[str, ...]
-    """In the order of the vector; those of general weights contain destination and source leg."""
-    weights: Callable[[np.ndarray], AnyWeights]
-    """From a vector, (parameter,)."""
-    vector: Callable[[AnyWeights], np.ndarray]
-    """The parameters of any weights, (parameter,), for comparison; NaN if these have no parameter of that name."""
-
-
-def _symmetric(size: Literal[9, 10]) -> _Weights:
-    names = [one.name for one in fields(Symmetric) if one.name != "p34_i" or size == 10]
-
-    def vector(weights: AnyWeights) -> np.ndarray:
-        known = isinstance(weights, Symmetric)
-        return np.array([getattr(weights, name) if known else np.nan for name in names])
-
-    return _Weights(tuple(names), Symmetric.from_vector, vector)
-
-
-def _mirrored(vector: np.ndarray) -> Weights:
-    matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
-    for (kind, (d, e)), value in zip(_LEFT, vector, strict=True):
-        matrices[kind][d, e] = matrices[kind][MIRROR[d], MIRROR[e]] = value
-    return Weights(**matrices)
-
-
-def _left(weights: AnyWeights) -> np.ndarray:
-    matrices = general(weights)
-    return np.array([getattr(matrices, kind)[pair] for kind, pair in _LEFT])
-
-
-FORMS: dict[FormName, _Weights] = {
-    "hws": _symmetric(9),
-    "ldvs": _symmetric(10),
-    "mirrored": _Weights(names_of(_LEFT), _mirrored, _left),
-    "general": _Weights(names_of(_ALL), Weights.from_vector, lambda weights: general(weights).to_vector()),
-}
-"""Forms of the 1998 network by name."""
+        Raises:
+            InputError: it is of another class, or differs in a field that is not searched.
+        """
+        usual: Any = self.usual
+        if type(controller) is not type(usual):
+            raise InputError(f"begin = {controller.name}; expected a {type(usual).__name__}, which is searched")
+        kept = [one.name for one in fields(usual) if one.init and one.name not in (*self.names, "name")]
+        if different := [name for name in kept if plain(getattr(controller, name)) != plain(getattr(usual, name))]:
+            raise InputError(f"begin = {controller.name} has another {different[0]} than the searched controller")
+        return np.array([float(getattr(controller, name)) for name in self.names])
 
 
 @dataclass(frozen=True)
@@ -185,25 +122,25 @@ class NetworkForm:
 
     def __post_init__(self) -> None:
         choice("form", self.name, FORMS)
-        Cruse1998(FORMS[self.name].weights(np.zeros(len(self.names))), self.order, model_variant=self.model_variant)
+        self.controller(np.zeros(len(self.names)))  # checks order and model variant
 
     @property
     def names(self) -> tuple[str, ...]:
-        """See `Form.names`."""
-        return FORMS[self.name].names
+        """Names of the parameters; those of general weights contain destination and source leg."""
+        return FORMS[self.name]
 
     @property
     def binary(self) -> np.ndarray:
-        """See `Form.binary`: P^2 and P^4."""
+        """(parameter,) which are 0 or 1: P^2 and P^4."""
         return np.array([name.startswith(BINARY) for name in self.names])
 
     @property
     def begin(self) -> None:
-        """None: the paper's '0'-individual, or the middle of the box."""
+        """None: the algorithm begins with the paper's '0'-individual, or with the middle of the box."""
         return None
 
     def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the box, which the paper does not print.
+        """Return the box of the first population, which the paper does not print, (parameter,) each.
 
         It is -reach to reach for neutral positions and their change with velocity [mm], 0 to reach for shifts [mm] and
         weights (the signs of the printed sets), and 0 to 1 for binary parameters.
@@ -212,9 +149,8 @@ class NetworkForm:
         return np.where(neutral, -reach, 0.0), np.where(self.binary, 1.0, reach)
 
     def controller(self, vector: np.ndarray) -> Cruse1998:
-        """See `Form.controller`."""
-        weights = FORMS[self.name].weights(_parameters(vector, self.names))
-        return Cruse1998(weights, self.order, model_variant=self.model_variant)
+        """Return the network of a vector, (parameter,)."""
+        return Cruse1998(self._weights(vector), self.order, model_variant=self.model_variant)
 
     def vector(self, controller: Controller) -> np.ndarray:
         """Return the weights of a network, (parameter,). Its order of updates and model variant are not part of them.
@@ -224,25 +160,28 @@ class NetworkForm:
         """
         if type(controller) is not Cruse1998:
             raise InputError(f"begin = {controller.name}; expected a weight set of the 1998 network")
-        if not _has_form(self.name, controller.weights):
-            others = ", ".join(name for name in FORMS if _has_form(name, controller.weights))
-            raise InputError(f"begin = {controller.name} has no weights of the form {self.name}; valid forms: {others}")
-        return FORMS[self.name].vector(controller.weights)
+        vector, weights = self.parameters(controller.weights), general(controller.weights).to_vector()
+        if np.isnan(vector).any() or not np.array_equal(general(self._weights(vector)).to_vector(), weights):
+            raise InputError(f"begin = {controller.name}; expected weights of the form {self.name}")
+        return vector
+
+    def parameters(self, weights: AnyWeights) -> np.ndarray:
+        """Return the numbers in any weights that this form names, (parameter,); NaN if these have no such number."""
+        if self.name in PLACES:
+            return np.array([getattr(general(weights), kind)[pair] for kind, pair in PLACES[self.name]])
+        known = isinstance(weights, Symmetric)
+        return np.array([getattr(weights, name) if known else np.nan for name in self.names])
+
+    def _weights(self, vector: np.ndarray) -> AnyWeights:
+        if self.name not in PLACES:
+            return Symmetric.from_vector(vector)
+        numbers = dict(zip(PLACES[self.name], vector, strict=True))
+        if self.name == "mirrored":
+            numbers |= {(kind, (MIRROR[d], MIRROR[e])): value for (kind, (d, e)), value in numbers.items()}
+        return Weights.of(numbers)
 
 
-def _has_form(form: FormName, weights: AnyWeights) -> bool:
-    """Whether a form's parameters determine the weights."""
-    vector = FORMS[form].vector(weights)
-    if not np.isfinite(vector).all():
-        return False
-    return np.array_equal(general(FORMS[form].weights(vector)).to_vector(), general(weights).to_vector())
-
-
-def _parameters(vector: ArrayLike, names: tuple[str, ...]) -> np.ndarray:
-    values = numbers("vector", vector)
-    if values.shape != (len(names),):
-        raise InputError(f"vector has the shape {values.shape}; expected ({len(names)},), one number a parameter")
-    return values
+Form = FieldsForm | NetworkForm
 
 
 def named_form(
@@ -264,8 +203,6 @@ def named_form(
         return NetworkForm(name, order or usual.order, model_variant or usual.model_variant)
     if order or model_variant:
         raise InputError(f"order and model_variant need one of the forms {', '.join(FORMS)}; form = {name}")
-    if (whole := PART.sub("", name)) != name and parameter_file(whole):
-        raise InputError(f"form = {name}; expected {whole}, without the ending")
     try:
         return FieldsForm(load_controller(name), name)
     except InputError as error:

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field, is_dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, OutOfReach, Refused, SimulationError
 from hexmj.measures.kinematic import first_loss
+from hexmj.measures.tables import columns
 from hexmj.plain import plain
 from hexmj.progress import Progress, part_of
 from hexmj.search.algorithms import Domain
@@ -21,16 +22,13 @@ from hexmj.starts import checked_velocities, draw_starts
 from hexmj.stats import wilson_intervals
 from hexmj.threads import thread_count
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, check_in_time, observation_duration, steps_within
-from hexmj.validate import choice, number, numbers
+from hexmj.validate import choice, number
 from hexmj.variants import variants, varied
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from hexmj.physics.settle import Settled
-
-LARGEST = 1e30
-"""Greatest magnitude of a parameter in the first population."""
 
 REFUSED = 1.0
 """Cost of a candidate that its controller refuses, whose targets no leg reaches, or of which a simulation fails: as if
@@ -68,10 +66,10 @@ class Problem:
     shows a way if all starts lose stability."""
 
     def __post_init__(self) -> None:
-        if not (is_dataclass(self.form) and isinstance(self.form, Form)):
-            raise InputError(f"form = {self.form!r:.80}; expected a frozen dataclass such as NetworkForm or FieldsForm")
-        choice("over", self.over, ("usual", "mean", "worst"))
-        choice("ties", self.ties, ("equal", "later"))
+        if not isinstance(self.form, Form):
+            raise InputError(f"form = {self.form!r:.80}; expected a NetworkForm or a FieldsForm")
+        choice("over", self.over, get_args(Over))
+        choice("ties", self.ties, get_args(Ties))
         if not 0 <= number("low", self.low) <= number("high", self.high) < 1:
             raise InputError(f"velocity range {self.low} to {self.high}; expected 0 <= low <= high < 1")
         if self.feedback and not self.conditions:
@@ -86,30 +84,20 @@ class Problem:
         steps_within(duration, self.stride)
 
     @property
-    def variants(self) -> "dict[str, Problem]":
-        """The problems over which the mean or the greatest FLSS is taken, by the names of the variants."""
-        if self.over == "usual":
-            return {"usual": self}
-        return {
-            name: replace(self, form=varied(self.form, name), stride=varied(self.stride, name), over="usual")
-            for name in variants(physical=self.conditions is not None)
-        }
-
-    @property
     def observation_times(self) -> list[str | float]:
         """The observation time of the cost, and the named ones."""
         named = [name for name in OBSERVATION_TIMES if self.low > 0 or name != "walk"]
         return list(dict.fromkeys([self.observation_time, *named]))
 
     def domain(self, reach: float, begin: Controller | None = None) -> Domain:
-        """Return the box of the first population, see `Form.box`, with the vector of `begin` if that is given."""
-        if number("domain", reach, 0.0, 1e6) == 0.0:
+        """Return the box of the first population, with the vector of `begin` if that is given.
+
+        At a reach of 1 the greater magnitude of a parameter's ends is its unit.
+        """
+        if not number("domain", reach, 0.0, 1e6):
             raise InputError("domain = 0; expected a positive number")
-        low, high = (numbers("box of the form", end) for end in self.form.box(reach))
-        if not ((np.abs(low) <= LARGEST) & (np.abs(high) <= LARGEST) & (low < high)).all():
-            raise InputError(f"box of the form = {low}, {high}; expected finite numbers, the least ones first")
-        unit = np.abs(self.form.box(1.0)).max(axis=0)
-        return Domain(low, high, self.form.binary, self.form.begin if begin is None else self.form.vector(begin), unit)
+        vector, unit = self.form.vector(begin) if begin else self.form.begin, np.abs(self.form.box(1.0)).max(axis=0)
+        return Domain(*self.form.box(reach), self.form.binary, vector, unit)
 
     def controller(self, vector: np.ndarray) -> Controller:
         """Return the controller of a candidate, (parameter,)."""
@@ -127,9 +115,9 @@ class Problem:
     @property
     def minimised(self) -> str:
         """The cost in words."""
-        cost = "FLSS"
-        if self.ties == "later":
-            cost = f"(starts {'that fell' if self.conditions else 'lost'} + mean part of the time lost) / (starts + 1)"
+        lost = "that fell" if self.conditions else "lost"
+        later = f"(starts {lost} + mean part of the time lost) / (starts + 1)"
+        cost = later if self.ties == "later" else "FLSS"
         names = {"usual": cost, "mean": f"mean over variants of {cost}", "worst": f"greatest {cost} of all variants"}
         return names[self.over]
 
@@ -151,9 +139,16 @@ class Sample:
 
     @cached_property
     def variants(self) -> "dict[str, Sample]":
-        """The same starts for each of the problem's variants, by name."""
-        several = self.problem.over != "usual"
-        return {name: replace(self, problem=one) if several else self for name, one in self.problem.variants.items()}
+        """The same starts for each of the problem's variants, over which `over` is taken, by name."""
+        problem = self.problem
+        if problem.over == "usual":
+            return {"usual": self}
+
+        def under(name: str) -> Sample:
+            form, stride = varied(problem.form, name), varied(problem.stride, name)
+            return replace(self, problem=replace(problem, form=form, stride=stride, over="usual"))
+
+        return {name: under(name) for name in variants(physical=problem.conditions is not None)}
 
     @cached_property
     def starts(self) -> np.ndarray:
@@ -173,7 +168,7 @@ class Sample:
         """Let the starts of all variants come to rest if candidates walk physically.
 
         Raises:
-            InputError, SimulationError: a start does not, see `physics.settle.settle`.
+            InputError, SimulationError: a start does not.
         """
         from hexmj.physics.settle import settle
 
@@ -184,30 +179,28 @@ class Sample:
     def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
         """Return G of each candidate, (candidate,), from (candidate, parameter)."""
         self.settle(threads)
-        return self._combined([one._costs(vectors, threads) for one in self.variants.values()])
 
-    def _combined(self, values: Any) -> np.ndarray:
-        """Combine values of all variants, (variant, ...), into the one that is minimised, (...)."""
-        return np.mean(values, axis=0) if self.problem.over == "mean" else np.max(values, axis=0)
-
-    def _costs(self, vectors: np.ndarray, threads: int | None) -> np.ndarray:
-        """Return G of each candidate, (candidate,), of this variant."""
-
-        def cost(vector: np.ndarray, threads: int | None) -> float:
+        def cost(one: Sample, vector: np.ndarray, threads: int | None) -> float:
             try:
-                candidate = self.problem.controller(vector)
+                candidate = one.problem.controller(vector)
             except ValueError:
                 return REFUSED
             try:
-                return self._cost(candidate, threads)
+                return one._cost(candidate, threads)
             except (OutOfReach, Refused, SimulationError):
                 return REFUSED
 
         # Plans of other controllers may share arrays of their module, and hold the interpreter's lock anyway.
         if self.problem.conditions or len(vectors) == 1 or not isinstance(self.problem.form, NetworkForm):
-            return np.array([cost(vector, threads) for vector in vectors])
-        with ThreadPoolExecutor(thread_count(threads)) as pool:
-            return np.array(list(pool.map(cost, vectors, [1] * len(vectors))))
+            values = [[cost(one, vector, threads) for vector in vectors] for one in self.variants.values()]
+        else:
+            with ThreadPoolExecutor(thread_count(threads)) as pool:
+                values = [list(pool.map(partial(cost, one, threads=1), vectors)) for one in self.variants.values()]
+        return self._combined(values)
+
+    def _combined(self, values: Any) -> np.ndarray:
+        """Combine values of all variants, (variant, ...), into the one that is minimised, (...)."""
+        return np.mean(values, axis=0) if self.problem.over == "mean" else np.max(values, axis=0)
 
     def _cost(self, candidate: Controller, threads: int | None) -> float:
         """Return FLSS; if ties are broken, the mean part of the time lost counts as one more start."""
@@ -226,19 +219,10 @@ class Sample:
         return min(int(cost * (self.n_starts + 1) + 1e-9), self.n_starts)  # less than one start more for the time
 
     def check_walks(self, vector: np.ndarray, threads: int | None = None) -> None:
-        """Raise the error of a candidate, (parameter,), that does not walk.
-
-        Raises:
-            InputError: its controller refuses to walk, or no leg reaches its targets.
-            SimulationError: a start's simulation fails.
-        """
+        """Raise the InputError or SimulationError of a candidate, (parameter,), that does not walk."""
         self.settle(threads)
         for one in self.variants.values():
-            try:
-                one._times(one.problem.controller(vector), [one.problem.observation_time], threads)
-            except (InputError, SimulationError) as error:
-                error.add_note("as the best candidate of the search")
-                raise
+            one._times(one.problem.controller(vector), [one.problem.observation_time], threads)
 
     def verdict(
         self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None
@@ -246,10 +230,7 @@ class Sample:
         """Return FLSS of controllers over (controller, observation time) with its 95 % Wilson interval.
 
         The interval of a mean over variants is that of the rounded mean count. It is rather too wide: as if all
-        variants lost stability together.
-
-        Raises:
-            InputError: a controller does not walk.
+        variants lost stability together. Raises InputError if a controller does not walk.
         """
         import xarray as xr
 
@@ -264,17 +245,10 @@ class Sample:
                 advance(1.0)
             return (times <= ends).sum(axis=1)
 
-        lost = self._combined(
-            [[losses(one, controller) for controller in controllers.values()] for one in self.variants]
-        )
-        low, high = wilson_intervals(np.rint(lost), self.n_starts)
-        over, unit = ("controller", "observation_time"), {"units": "1"}
+        lost = self._combined([[losses(name, one) for one in controllers.values()] for name in self.variants])
+        interval = wilson_intervals(np.rint(lost), self.n_starts)
         return xr.Dataset(
-            {
-                "flss": (over, lost / self.n_starts, unit | {"long_name": "frequency of the loss of static stability"}),
-                "flss_low": (over, low, unit | {"long_name": "lower end of the 95 % Wilson interval"}),
-                "flss_high": (over, high, unit | {"long_name": "upper end of the 95 % Wilson interval"}),
-            },
+            columns("flss", ("controller", "observation_time"), lost / self.n_starts, *interval),
             coords={"controller": list(controllers), "observation_time": list(map(str, observation_times))},
         )
 

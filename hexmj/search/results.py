@@ -15,8 +15,9 @@ from hexmj.errors import InputError
 from hexmj.files import read_toml, write_text
 from hexmj.io import results_folder, save, save_figure
 from hexmj.plain import plain
+from hexmj.plotting import as_shipped, head, in_figure, picture, tidy
 from hexmj.progress import shown
-from hexmj.search.forms import FORMS, NetworkForm
+from hexmj.search.forms import FieldsForm, NetworkForm
 from hexmj.search.problems import Problem, Sample
 from hexmj.search.stages import STAGES, Effort, Found, search
 
@@ -54,11 +55,8 @@ class Result:
 
     def summary(self) -> dict[str, Any]:
         """Return parameters, cost, verdict and settings as plain data."""
-        found = self.found
-        times, names = self.verdict.observation_time.values.tolist(), self.verdict.controller.values.tolist()
-        at = {
-            name: {time: self.verdict.sel(controller=name, observation_time=time) for time in times} for name in names
-        }
+        found, judged = self.found, self.verdict.to_dataframe()
+        names, times = judged.index.levels
         return {
             "found": dict(zip(self.problem.form.names, found.vector.tolist(), strict=True)),
             "cost": found.cost,
@@ -68,10 +66,7 @@ class Result:
             "lost": found.lost,
             "starts": found.starts,
             "refused": len(found.refused),
-            "verdict": {
-                name: {time: {str(key): values.item() for key, values in one.items()} for time, one in row.items()}
-                for name, row in at.items()
-            },
+            "verdict": {name: {time: judged.loc[name, time].to_dict() for time in times} for name in names},
             "settings": self.settings,
             "files": self.files,
         }
@@ -92,7 +87,7 @@ def run_search(
     The found controller is compared with HWS and LDVS, or with the usual values of the controller that is searched.
 
     Args:
-        problem: the cost function, of a `NetworkForm` or a `FieldsForm`.
+        problem: the cost function.
         effort: algorithm, budgets and starts.
         out: directory for the found controller (TOML), the history (NetCDF), its figure and the cached evaluations. If
             a search is killed, the next one with the same settings resumes with equal results.
@@ -113,8 +108,8 @@ def run_search(
             f"verdict_seed = {effort.verdict_seed} is the seed of this search or of the one that found its beginning;"
             " expected another, for fresh starts"
         )
-    begins = [name for name in (effort.begin, problem.form.name) if isinstance(name, str)]  # pyright: ignore
-    if (Path(out) / FOUND).resolve() in [Path(name).resolve() for name in begins]:
+    begins = [Path(name).resolve() for name in (effort.begin, problem.form.name) if isinstance(name, str)]
+    if (Path(out) / FOUND).resolve() in begins:
         raise InputError(f"out = {out}: the search begins with {FOUND} there; expected another directory")
     problem.domain(effort.domain, effort.beginning)  # raises before a directory is made
     controllers, vectors = _compared(problem)
@@ -123,13 +118,10 @@ def run_search(
     judges.settle(threads)  # before the work, if a start does not
     found = search(problem, effort, folder=out / EVALUATIONS, threads=threads, progress=progress, fresh=fresh)
     history = found.history.assign_attrs(title=title(problem, effort))
-    seeds = sorted({*earlier, effort.seed})
-    head = f"# hexmj search: {title(problem, effort)}\nsearched = {{ seeds = {seeds} }}\n"
-    files = [
-        save(history, out / "history.nc"),
-        write_text(out / FOUND, head + _controller_toml(problem, found.vector)),
-        _save_figure(history, out / figure),
-    ]
+    head = f"# hexmj search: {title(problem, effort)}\nsearched = {{ seeds = {sorted({*earlier, effort.seed})} }}\n"
+    files = [save(history, out / "history.nc"), write_text(out / FOUND, head + _controller_toml(problem, found.vector))]
+    with as_shipped():
+        files.append(save_figure(convergence_figure(history), out / figure))
     with shown(progress, "judging") as advance:
         verdict = judges.verdict({"found": problem.controller(found.vector), **controllers}, threads, advance)
     return Result(problem, effort, found, {"found": found.vector} | vectors, verdict, files)
@@ -140,31 +132,30 @@ def title(problem: Problem, effort: Effort) -> str:
     at = f"V = {problem.low:g}" if problem.low == problem.high else f"V from {problem.low:g} to {problem.high:g}"
     at += f", {problem.over} of all variants" if problem.over != "usual" else ""
     at += ", later losses first among equals" if problem.ties == "later" else ""
-    kind, form = "physical" if problem.conditions else "kinematic", getattr(problem.form, "name", "form")
+    kind = "physical" if problem.conditions else "kinematic"
     method = f"observation time {problem.observation_time}, {effort.algorithm}, seed {effort.seed}"
-    return f"{form}, {kind} FLSS at {at}, {method}"
+    return f"{problem.form.name}, {kind} FLSS at {at}, {method}"
 
 
 def _earlier_seeds(problem: Problem, effort: Effort) -> set[int]:
     """Return the seeds of the searches that found what this search begins with."""
-    begins: list[tuple[str, Controller]] = []
-    if not isinstance(problem.form, NetworkForm):
-        begins.append((problem.form.name, problem.form.usual))  # pyright: ignore[reportAttributeAccessIssue]
-    if (begin := effort.beginning) is not None:
-        begins.append((effort.begin if isinstance(effort.begin, str) else begin.name, begin))
+    form, beginning = problem.form, effort.beginning
+    begins = [(form.name, form.usual)] if isinstance(form, FieldsForm) else []
+    if beginning is not None:
+        begins.append((effort.begin if isinstance(effort.begin, str) else beginning.name, beginning))
     return {seed for begin in begins for seeds in searched_on(*begin).values() for seed in seeds}
 
 
 def _compared(problem: Problem) -> tuple[Mapping[str, Controller], dict[str, np.ndarray]]:
     """Return the controllers with which the found one is compared, by name, and their parameters, (parameter,)."""
-    form: Any = problem.form
-    if isinstance(form, NetworkForm):
-        sets = {"hws": HWS, "ldvs": LDVS}
-        vectors = {name: FORMS[form.name].vector(one.weights) for name, one in sets.items()}
-        rules: dict[str, Any] = {"order": form.order, "model_variant": form.model_variant}
-        controllers = {name: replace(one, **rules) for name, one in sets.items()}
-    else:
+    form = problem.form
+    controllers: Mapping[str, Controller]
+    if isinstance(form, FieldsForm):
         controllers, vectors = {"usual": form.usual}, {"usual": form.begin}
+    else:
+        sets, rules = {"hws": HWS, "ldvs": LDVS}, {"order": form.order, "model_variant": form.model_variant}
+        controllers = {name: replace(one, **rules) for name, one in sets.items()}
+        vectors = {name: form.parameters(one.weights) for name, one in sets.items()}
     if problem.feedback:
         controllers = {name: SensoryFeedback(one) for name, one in controllers.items()}
     return controllers, vectors
@@ -174,26 +165,17 @@ def _controller_toml(problem: Problem, vector: np.ndarray) -> str:
     """Return the text that `load_controller` reads to the same bits: weights, or a controller and its fields."""
     import tomli_w
 
-    form: Any = problem.form
+    form = problem.form
     if isinstance(form, NetworkForm):
         return network_toml(form.controller(vector))
     file = parameter_file(form.name)
-    table = read_toml(file) if file else {"controller": form.name, "fields": {}}
+    table: dict[str, Any] = read_toml(file) if file else {"controller": form.name}
     values = table.get("fields", {}) | dict(zip(form.names, vector.tolist(), strict=True))
     return tomli_w.dumps({"controller": table["controller"], "fields": values})
 
 
-def _save_figure(history: "xr.Dataset", path: Path) -> Path:
-    from hexmj.plotting import as_shipped
-
-    with as_shipped():
-        return save_figure(convergence_figure(history), path)
-
-
 def convergence_figure(history: "xr.Dataset") -> "Figure":
     """Draw all candidates' costs and the least so far against the number of evaluations, from `stages.history`."""
-    from hexmj.plotting import head, in_figure, picture, tidy
-
     figure = picture(6.8, 4.2)
     axes = figure.subplots()
     history = history.sortby("evaluation")
@@ -206,11 +188,10 @@ def convergence_figure(history: "xr.Dataset") -> "Figure":
             marker = "o" if len(x) == 1 else None  # a line needs two points
             axes.plot(x, best, color=colour, linewidth=1.8, marker=marker, label=stage)
     cost = history.cost.attrs["long_name"]
-    plain_cost = cost == "FLSS"
-    label = f"{cost if plain_cost else 'cost'} on the starts of the stage"
+    label = f"{'FLSS' if cost == 'FLSS' else 'cost'} on the starts of the stage"
     axes.set(xlabel="evaluations of the cost function", ylabel=label, ylim=(-0.02, 1.02))
     head(figure, in_figure(history.attrs["title"]))
     tidy(axes)
-    below = "lines: least so far, dots: candidates" + ("" if plain_cost else f"\ncost: {cost}")
+    below = "lines: least so far, dots: candidates" + ("" if cost == "FLSS" else f"\ncost: {cost}")
     figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9, title=below, title_fontsize=8)
     return figure

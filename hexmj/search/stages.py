@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from hexmj.controllers.protocol import Controller, check_controller_type
+from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError, without_extra
 from hexmj.plain import plain
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 STAGES = ("population", "simplex")
-
-MOST = 10_000
-"""Individuals of the largest population."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +61,14 @@ class Effort:
     def __post_init__(self) -> None:
         if choice("algorithm", self.algorithm, ("evolution", "cmaes")) == "cmaes" and find_spec("cmaes") is None:
             raise without_extra("search", "cmaes, which the algorithm of this name needs,")
-        whole("population", self.population, 4 if self.algorithm == "cmaes" else 2, MOST)
+        whole("population", self.population, 4 if self.algorithm == "cmaes" else 2)
         for name in ("starts", "refine_starts", "verdict_starts"):
             if (size := getattr(self, name)) is not None:
                 check_draw(size, self.seed, name)
         whole("budget", self.budget, self.population)
         whole("refine_budget", self.refine_budget, 0)
-        whole("seed", self.seed, 0)
-        whole("verdict_seed", self.verdict_seed, 0)
+        check_draw(1, self.seed)
+        check_draw(1, self.verdict_seed, seed_name="verdict_seed")
 
     def completed(self, physical: bool) -> "Effort":
         """Return the effort with numbers of starts in place of None."""
@@ -81,11 +78,7 @@ class Effort:
     @property
     def beginning(self) -> Controller | None:
         """The controller that `begin` names."""
-        if isinstance(self.begin, str):
-            return load_controller(self.begin)
-        if self.begin is not None:
-            check_controller_type(self.begin)
-        return self.begin
+        return load_controller(self.begin) if isinstance(self.begin, str) else self.begin
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +106,7 @@ class Found:
         least = f"least cost {self.cost:.4g}"
         if problem.ties == "later":
             least += f" ({problem.minimised}" + (f"; {self.lost} of {self.starts} starts lost)" if self.lost else ")")
-        lines = [
-            f"{self.history.sizes['evaluation']} evaluations, {self.replayed} candidates from an earlier run; {least}"
-        ]
+        lines = [f"{len(self.history.cost)} evaluations, {self.replayed} candidates from an earlier run; {least}"]
         if lost := int((self.history.cost.values >= REFUSED).sum()):
             lines.append(f"{lost} evaluations cost 1: all starts lost stability, or the candidate does not walk")
         if self.refused:
@@ -149,10 +140,10 @@ def search(
     thread_count(threads)
     effort = effort.completed(physical=problem.conditions is not None)
     domain = problem.domain(effort.domain, effort.beginning)
-    refine_budget = 0 if domain.binary.all() else effort.refine_budget
-    sizes = {"population": effort.starts or 0} | ({"simplex": effort.refine_starts or 0} if refine_budget else {})
-    work = effort.budget * sizes["population"] + refine_budget * sizes.get("simplex", 0)
-    samples = {stage: Sample(problem, size, effort.seed) for stage, size in sizes.items()}
+    budgets = {"population": effort.budget, "simplex": effort.refine_budget}
+    sizes = {"population": effort.starts or 0, "simplex": effort.refine_starts or 0}
+    work = sum(budgets[stage] * sizes[stage] for stage in STAGES)
+    samples = {stage: Sample(problem, sizes[stage], effort.seed) for stage in STAGES if budgets[stage]}
     cached = {
         stage: CachedValues(Cell(stage, sample.costs, {}), folder, threads=threads, fresh=fresh)
         for stage, sample in samples.items()
@@ -175,14 +166,12 @@ def search(
         algorithm = Evolution if effort.algorithm == "evolution" else CovarianceAdaptation
         searcher = algorithm(domain, effort.population, effort.seed)
         best, cost = search_population(searcher, partial(costs, "population"), effort.budget)
-        if refine_budget:
-            best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), refine_budget, domain.unit)
+        if effort.refine_budget:
+            best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget, domain.unit)
     course = history(evaluated, problem.form.names, problem.minimised)
     refused = list(filter(None, map(problem.refusal, course.candidate.values)))
     if reason := problem.refusal(best):
-        raise InputError(
-            f"{len(refused)} of {course.sizes['evaluation']} candidates were refused, the best one: {reason}"
-        )
+        raise InputError(f"{len(refused)} of {len(course.cost)} candidates were refused, the best one: {reason}")
     last = list(samples.values())[-1]
     if cost >= REFUSED:
         last.check_walks(best, threads)
@@ -206,7 +195,7 @@ def history(evaluated: Sequence[Evaluated], names: Sequence[str], minimised: str
     """
     import xarray as xr
 
-    stage = np.repeat([STAGES.index(name) for name, *_ in evaluated], [len(costs) for *_, costs in evaluated])
+    stage = np.concatenate([np.full(len(costs), STAGES.index(name)) for name, _, costs in evaluated])
     cost = np.concatenate([costs for *_, costs in evaluated])
     best = cost.copy()
     for number in range(len(STAGES)):
