@@ -68,4 +68,4 @@ def test_many(measure, who):
         physical_outcomes(settled, LDVS, VELOCITY, FEW_STEPS * settled.stride.dt, threads=2)
 
     work, what = ours if who == "hexmj" else walks, f"environment, {MANY} insects"
-    measure(work, what, who, amount=MANY * FEW_STEPS, unit="steps/s", ratio=0.7, rounds=5)
+    measure(work, what, who, amount=MANY * FEW_STEPS, unit="steps/s", ratio=0.8, rounds=5)
