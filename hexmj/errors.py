@@ -23,10 +23,10 @@ class StillThrown(InputError):
 class SimulationError(RuntimeError):
     """A physical simulation that did not settle or diverged. It is never counted as an outcome."""
 
-    def __init__(self, message: str, state: Mapping[str, Any] | None = None, file_name: str = "") -> None:
-        """Keep the last finite state, if it is known, and a name for a file of it."""
-        super().__init__(message, state, file_name)
-        self.message, self.state, self.file_name = message, dict(state or {}), file_name
+    def __init__(self, message: str, state: Mapping[str, Any] | None = None) -> None:
+        """Keep the last finite state, if it is known."""
+        super().__init__(message, state)
+        self.message, self.state = message, dict(state or {})
 
     def __str__(self) -> str:
         return self.message

@@ -1,6 +1,5 @@
 """What physics and time step cannot hold is refused, and a walk that exploded is an error; a fall stays an outcome."""
 
-from contextlib import chdir
 from dataclasses import replace
 from math import pi
 
@@ -12,7 +11,6 @@ from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.planning import begin
 from hexmj.errors import InputError, SimulationError, StillThrown
 from hexmj.measures.physical import outcomes_of_plan
-from hexmj.physics import divergence
 from hexmj.physics.divergence import MOST_ENERGY, explosion
 from hexmj.physics.outcomes import Outcomes, OutcomesSoFar
 from hexmj.physics.pushes import Push
@@ -49,17 +47,11 @@ def test_as_much_grasp_as_the_contacts_can_hold_keeps_the_insect_on_the_ground()
     assert np.abs(speed).max() / settled.compiled.model.opt.timestep < 100.0
 
 
-def test_a_walk_with_energy_from_nowhere_is_an_error_that_can_be_replayed(tmp_path, capsys):
-    """Up to where it was seen, and one step on."""
+def test_a_walk_with_energy_from_nowhere_is_an_error_with_its_state():
     settled = thrown(up=1500.0)
     with pytest.raises(SimulationError) as error:
         walked(settled)
-    path = divergence.save_state(error.value, tmp_path)
-    positions = divergence.replay(path)
-    assert positions.shape == (len(error.value.state["ctrl"]), settled.compiled.model.nq)
-    assert f"{positions[-2, 2]:.3g} mm" in str(error.value)
-    divergence.main(str(path))
-    assert capsys.readouterr().out.startswith("step 1: ")
+    assert np.isfinite(error.value.state["qpos"]).all()
 
 
 def test_a_walk_that_explodes_before_its_push_is_an_error():
@@ -150,12 +142,3 @@ def test_a_walk_without_contact_is_no_outcome():
         so_far.add(replace(chunk, sensors=sensors))
     with pytest.raises(SimulationError):
         so_far.outcomes()
-
-
-def test_a_state_that_diverged_says_so_again(tmp_path, capsys):
-    settled = thrown(up=1e12)
-    with chdir(tmp_path):  # MuJoCo writes its own log
-        with pytest.raises(SimulationError) as error:
-            walked(settled)
-        divergence.main(str(divergence.save_state(error.value, tmp_path)))
-    assert capsys.readouterr().out.startswith("it diverged: mjWARN")

@@ -20,7 +20,6 @@ from hexmj.measures.compare import compare, physical_flss
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk
 from hexmj.physics import engine
-from hexmj.physics.divergence import replay, save_state
 from hexmj.physics.engine import STATE_BITS, Diverged, MujocoBatch, walk_error
 from hexmj.physics.foot_path import OrdersFromPlan
 from hexmj.physics.outcomes import Outcomes
@@ -254,8 +253,8 @@ def test_what_a_body_shows_where_it_stands_is_mujocos_own(settled):
 
 
 @pytest.mark.parametrize("parts", [2, 4])
-def test_a_diverged_state_goes_on_as_it_did(parts, tmp_path, monkeypatch):
-    """With the time step, the contacts and the push of its own roll, fine as it may be, and its conditions."""
+def test_a_diverged_walk_is_an_error_with_its_state(parts, tmp_path, monkeypatch):
+    """With the time step, the contacts and the push of its own roll."""
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its own log
     conditions = Conditions(load=1.0, grasp=0.5, friction=0.7)
     two = settle(draw_starts(2, 0), conditions)
@@ -266,14 +265,12 @@ def test_a_diverged_state_goes_on_as_it_did(parts, tmp_path, monkeypatch):
     with pytest.raises(Diverged) as error:
         batch.roll(ids, two.ctrl[:, np.newaxis].repeat(parts, axis=1), parts)
     assert error.value.start == 1
-    path, state = save_state(walk_error(error.value, "resting", 0.0, conditions), tmp_path), error.value.state
+    state = walk_error(error.value, "resting", 0.0, conditions).state
     assert state["timestep"] == two.compiled.model.opt.timestep / parts
     assert (state["contact"] == 2 * state["timestep"]).all()
     assert np.array_equal(state["qpos"], two.qpos[1])
     assert state["xfrc_applied"][two.compiled.root, 1] == 7.0
     assert state["ctrl"].shape == (parts, two.compiled.model.nu)
-    with pytest.raises(Diverged):
-        replay(path)
 
 
 def test_every_start_is_stable_fallen_or_refused_with_a_reason():

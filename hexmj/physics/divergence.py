@@ -1,30 +1,18 @@
-"""Guards: a simulation that diverged or exploded is an error, never an outcome; its state can be saved and replayed.
+"""Guards: a simulation that diverged or exploded is an error, never an outcome.
 
 The guard against explosions bounds the energy of the root as a height: its own above the ground and v^2 / 2g, to which
 only V_p may add. Nor does a walk tilt past a right angle, before the trunk touches the ground, with more energy than it
 takes to tumble. A push of impulse J adds at most J / m to the speed of the centre of mass, while the root may move
 faster when the insect turns over: after a push the energy of the centre of mass is bounded.
-
-`python -m hexmj.physics.divergence FILE` replays a saved state.
 """
 
-import json
-import sys
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hexmj.bodies.mjcf import compile_body
-from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
-from hexmj.conditions import Conditions
-from hexmj.errors import InputError, SimulationError, StillThrown
-from hexmj.files import replacing
+from hexmj.errors import StillThrown
 from hexmj.jitted import jitted
-from hexmj.physics.engine import Diverged, MujocoBatch
 from hexmj.physics.settle import Settled
-from hexmj.physics.substeps import FineSteps
-from hexmj.rotations import lean
 
 MOST_ENERGY = 2.0
 """Greatest energy of a root without V_p and pushes, as a height in lengths of the shortest leg; measured is 1.2."""
@@ -128,54 +116,3 @@ def most_energy(settled: Settled, impulse: np.ndarray) -> np.ndarray:
 
 def _twice_gravity(settled: Settled) -> float:
     return 2.0 * settled.compiled.weight / settled.conditions.body.mass
-
-
-def save_state(error: SimulationError, folder: Path) -> Path:
-    """Write the last finite state of an error into a folder; `replay` reads it."""
-    path = folder / error.file_name
-    with replacing(path) as part:
-        np.savez(part, allow_pickle=False, **error.state)
-    return path
-
-
-def replay(path: Path | str, body: Body = STICK_INSECT) -> np.ndarray:
-    """Repeat the steps of a saved state with its conditions, time step, contacts, push and controls.
-
-    Returns:
-        Positions after each physics step, (step, position).
-
-    Raises:
-        Diverged: it diverges again.
-        InputError: the file cannot be read, or is of another body.
-    """
-    try:
-        with np.load(path) as file:
-            saved = dict(file)
-        conditions = Conditions(body=body, **json.loads(str(saved["conditions"])))
-        compiled = compile_body(conditions, float(saved["timestep"]))
-        compiled.model.pair_solref[:, 0] = saved["contact"]
-        batch = MujocoBatch(compiled, 1, threads=1)
-        batch.put_back(saved)
-    except (KeyError, OSError, ValueError) as error:
-        raise InputError(f"{path} is not a saved state of body {body.name!r}: {error}") from None
-    only, control = np.array([0]), saved["ctrl"][np.newaxis]
-    if "substeps" in saved:  # an explosion, saved from the beginning of a step of the plan
-        after = FineSteps.of(batch, int(saved["substeps"]), compiled).take(only, control)["after"]
-    else:
-        after = batch.roll(only, control, 1).after
-    return after[0, :, : compiled.model.nq]
-
-
-def main(path: str) -> None:
-    """Print the height and tilt of the stick insect's root after each physics step of a saved state."""
-    try:
-        for step, qpos in enumerate(replay(path)):
-            print(f"step {step + 1}: {qpos[2]:.4g} mm high, tilted by {lean(qpos[3:ROOT_QPOS])[1]:.3g} rad")
-    except Diverged as error:
-        print(f"it diverged: {error.kinds}")
-    except InputError as error:
-        sys.exit(str(error))
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])

@@ -87,7 +87,7 @@ class Diverged(Exception):
     """One body that diverged; `walk_error` makes the user's error of it."""
 
     def __init__(self, start: int, kinds: str, state: dict[str, np.ndarray], substep: int = 0) -> None:
-        """`start` is its index, `kinds` names what happened, `state` replays it."""
+        """`start` is its index, `kinds` names what happened, `state` is the last finite one."""
         super().__init__(start, kinds)
         self.start, self.kinds, self.state, self.substep = start, kinds, state, substep
 
@@ -96,7 +96,7 @@ def walk_error(error: Diverged, doing: str, time: float, conditions: Conditions)
     """The error of a body that diverged while it was `doing` something, at a time [time units]."""
     text = json.dumps(conditions.values(), default=lambda number: number.item())
     message = f"start {error.start} diverged while {doing}, at {time:.4g} time units: {error.kinds}"
-    return SimulationError(message, error.state | {"conditions": np.array(text)}, f"diverged-start-{error.start}.npz")
+    return SimulationError(message, error.state | {"conditions": np.array(text)})
 
 
 class MujocoBatch:
