@@ -2,9 +2,7 @@
 
 import importlib.util
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
-from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import plain_network as plain
-from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, ModelVariant, Order, Weights, kernel
+from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, ModelVariant, Weights, kernel
 from hexmj.controllers.cruse1998 import network as network_module
 from hexmj.controllers.cruse1998.kernel import LANES
 from hexmj.controllers.cruse1998.weights import general
@@ -81,20 +79,6 @@ def test_equals_plain_network_to_the_last_bit(seed, size, threads, rules, geomet
         assert np.array_equal(fast.velocity[:, i], v)
         unstable = [n for n in range(steps) if not plain.stable(x[n], s[n], stride)]
         assert lost[i] == ((unstable[0] + 1) * stride.dt if unstable else np.inf)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("order", get_args(Order))
-def test_every_model_variant_equals_the_plain_network(order):
-    """All 48 combinations of choices: each is compiled by itself."""
-    rng, hints = np.random.default_rng(14), get_type_hints(ModelVariant)
-    for choices in product(*map(get_args, hints.values())):
-        variant, p, start = ModelVariant(*choices), random_weights(rng), random_starts(rng, 1)
-        acceleration = Acceleration(0.002, 0.1)
-        fast = walk(start, Cruse1998(p, order, model_variant=variant), 0.4, 30.0, acceleration=acceleration)
-        x, s, _ = plain.walk(list(start[0]), p, 0.4, 300, STRIDE, order, acceleration, variant)
-        assert np.array_equal(fast.x[:, 0], x)
-        assert np.array_equal(fast.stance[:, 0], np.array(s) == 1)
 
 
 @pytest.mark.parametrize("geometry", [FIG1, NEAR])
