@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
 
 FIGURES: dict[str, dict[str, str]] = {
     "flss": {"flss": "measures.figures:flss_figure"},
@@ -48,6 +49,21 @@ MEASURE_STYLES: dict[str, dict[str, Any]] = {
     "toppled": {"color": "#6a4c93", "marker": "x", "linestyle": ":"},
 }
 """Styles of the measures, which differ without colours too."""
+
+SERIES: tuple[dict[str, Any], ...] = (
+    {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
+    {"color": "#2a9d5c", "marker": "s", "linestyle": "--"},
+    {"color": "#e08e1b", "marker": "^", "linestyle": "-."},
+    {"color": "#b3261e", "marker": "D", "linestyle": ":"},
+    {"color": "#6a4c93", "marker": "v", "linestyle": (0, (5, 1))},
+)
+"""Styles of other curves in turn."""
+
+VELOCITY = "velocity $V_r / V_p$"
+"""Label of an axis of velocities."""
+
+LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9}
+"""Options of a legend."""
 
 
 def plot(result: "xr.Dataset", which: str | None = None) -> "Figure":
@@ -122,7 +138,7 @@ def velocity_ticks(axes: "Axes", velocities: Sequence[float] | np.ndarray) -> No
 def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
     """Set up axes of FLSS against velocity."""
     low, high = max(-BESIDE, velocities.min() - 0.1), min(1.0 + BESIDE, velocities.max() + 0.1)
-    axes.set(xlabel="velocity $V_r / V_p$", xlim=(low, high), ylabel="FLSS", ylim=(-0.02, 1.02))
+    axes.set(xlabel=VELOCITY, xlim=(low, high), ylabel="FLSS", ylim=(-0.02, 1.02))
     velocity_ticks(axes, velocities)
     tidy(axes)
 
@@ -137,5 +153,45 @@ def frequency_curve(axes: "Axes", x: "np.ndarray | xr.DataArray", data: "xr.Data
         name: of the frequency.
         style: options of `Axes.errorbar`.
     """
+    axes.errorbar(x, *interval(data, name), **CURVE | style)
+
+
+def interval(data: "xr.Dataset", name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return a frequency, (n,), and how far its interval reaches below and above it, (2, n)."""
     low, middle, high = (data[name + end].values for end in ("_low", "", "_high"))
-    axes.errorbar(x, middle, [middle - low, high - middle], **CURVE | style)
+    return middle, np.stack([middle - low, high - middle])
+
+
+def heat_map(
+    axes: "Axes", values: np.ndarray, texts: np.ndarray, faint: np.ndarray | None = None, **style: Any
+) -> "AxesImage":
+    """Draw numbers as colours, without a frame, and a text in every cell.
+
+    Args:
+        axes: to draw in.
+        values: (row, column), the first row at the top; NaN has no colour.
+        texts: (row, column).
+        faint: where the text is grey, (row, column); elsewhere it is bold. By default all texts are black.
+        style: options of `Axes.imshow`.
+    """
+    image = axes.imshow(values, aspect="auto", **style)
+    dark = image.to_rgba(values)[..., :3] @ [0.3, 0.59, 0.11] < 0.5
+    for row, column in np.argwhere(texts != ""):
+        grey = faint is not None and faint[row, column]
+        white = dark[row, column] and np.isfinite(values[row, column])
+        shown: dict[str, Any] = {
+            "color": "white" if white else "0.4" if grey else "0.1",
+            "ha": "center",
+            "va": "center",
+        }
+        weight = "normal" if faint is None or grey else "bold"
+        axes.text(column, row, str(texts[row, column]), **shown, fontweight=weight, fontsize=8, linespacing=1.1)
+    axes.tick_params(which="both", length=0)
+    axes.spines[:].set_visible(False)
+    return image
+
+
+def velocity_columns(axes: "Axes", velocities: np.ndarray) -> None:
+    """Label the columns of a heat map with velocities."""
+    axes.set_xticks(range(len(velocities)), [f"{v:g}" for v in velocities], fontsize=8)
+    axes.set_xlabel(VELOCITY, fontsize=9)

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexmj.conditions import unusual
 from hexmj.io import settings
-from hexmj.plotting import BESIDE, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture
+from hexmj.plotting import BESIDE, LEGEND, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
@@ -106,8 +106,8 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
         lowest = n + columns >= len(names)
         axes.tick_params(labelbottom=lowest)
         axes.set(xlabel=axes.get_xlabel() if lowest else "", ylabel="" if n % columns else "FLSS")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=len(labels))
+    handles, _ = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=len(handles))
     head(figure, "Loss of static stability: kinematic, and measured under the feet; physical: falls", caption(result))
     return figure
 

@@ -12,7 +12,7 @@ from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.figures import caption
 from hexmj.measures.tables import FRESH, PERIODS, differences, frequencies, happened, padded, velocity_axis
-from hexmj.plotting import head, in_figure, picture
+from hexmj.plotting import head, heat_map, in_figure, picture, velocity_columns
 from hexmj.studies.base import Study
 from hexmj.studies.entrants import Entrant, short_names
 from hexmj.studies.league import REGIMES
@@ -41,11 +41,7 @@ NOTES = {NONE: "no walk is left", FEWER: "walks are missing that diverged or wer
 
 
 def wholes(names: Sequence[str]) -> dict[str, dict[str, Controller]]:
-    """Return the controllers `switched` of each whole, by short names.
-
-    Raises:
-        InputError: there is no such controller, or it has nothing to switch.
-    """
+    """Return the controllers `switched` of each whole, by short names."""
     short = short_names({name: load_controller(name) for name in names})
     return {short[name]: switched(name, short[name]) for name in names}
 
@@ -156,34 +152,25 @@ def _events(cell: "xr.Dataset") -> np.ndarray:
 
 def ablation_figure(result: "xr.Dataset") -> "Figure":
     """Draw frequencies of the wholes, and below each how much more often events happen without a part."""
-    rows, velocities = result.sizes["controller"], [f"{v:g}" for v in result.velocity.values]
-    figure = picture(2.6 + 0.58 * len(MEASURES) * max(4, len(velocities)), 1.9 + 0.27 * rows)
+    rows, columns = result.sizes["controller"], result.sizes["velocity"]
+    figure = picture(2.6 + 0.58 * len(MEASURES) * max(4, columns), 1.9 + 0.27 * rows)
     panels, used = figure.subplots(1, len(MEASURES), sharey=True), set[str]()
     wholes = result.controller.values == result.whole.values
     for panel, (measure, title) in zip(panels, MEASURES.items(), strict=True):
         data = result.sel(measure=measure).transpose("controller", "velocity", ...)
+        cells = [cell_text(data.isel(controller=row, velocity=v)) for row, v in np.ndindex(rows, columns)]
+        texts, sure = (np.reshape(values, (rows, columns)) for values in zip(*cells, strict=True))
+        used |= {mark for mark in NOTES for text, _ in cells if mark in text}
         shown = np.where(wholes[:, None], np.nan, data.more.values)
-        panel.imshow(shown, cmap="RdBu_r", vmin=-1.0, vmax=1.0, aspect="auto")
-        for row, column in np.ndindex(shown.shape):
-            text, sure = cell_text(data.isel(controller=row, velocity=column))
-            used |= {*text} & {*NOTES}
-            depth = abs(np.nan_to_num(shown[row, column]))  # of the colour behind the text
-            colour = "white" if depth > 0.6 else "0.1" if sure or depth > 0.2 else "0.5"
-            style = {"ha": "center", "va": "center", "fontsize": 8, "color": colour}
-            panel.text(column, row, text, **style, fontweight="bold" if sure else "normal")
+        heat_map(panel, shown, texts, ~sure, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
         panel.set_title(f"{measure}\n{title}", fontsize=9)
-        panel.set_xticks(range(len(velocities)), velocities)
-        panel.set_xlabel("velocity $V_r / V_p$", fontsize=9)
-        panel.tick_params(length=0)
-        panel.spines[:].set_visible(False)
+        velocity_columns(panel, result.velocity.values)
         for row in np.flatnonzero(result.whole.values[1:] != result.whole.values[:-1]):
             panel.axhline(row + 0.5, color="0.3", linewidth=0.8)
     panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values])
     heading = "What a part buys: frequencies of the whole, and differences without it (bold: 95 % interval excludes 0)"
-    counts = (
-        f"{result.attrs['physical_starts']} of them in physics, {min(result.attrs['starts'], REGIMES)} for the gait"
-    )
-    head(figure, heading, f"{caption(result)}; {counts}")
+    physical, gaits = result.attrs["physical_starts"], min(result.attrs["starts"], REGIMES)
+    head(figure, heading, f"{caption(result)}; {physical} of them in physics, {gaits} for the gait")
     if used:
         figure.supxlabel("; ".join(f"{mark} {note}" for mark, note in NOTES.items() if mark in used), fontsize=8)
     return figure

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+GROUND = "ground", "ground_height", "ground_at", "ground_length", "ground_seed"
+"""Conditions of the ground, which some studies set."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Study:
     """Settings that all studies share; the same starts walk in every cell.

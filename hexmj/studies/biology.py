@@ -15,8 +15,8 @@ from hexmj.errors import InputError
 from hexmj.io import markdown_table
 from hexmj.measures.figures import caption
 from hexmj.phases import unrolled
-from hexmj.plotting import CURVE, head, picture, tidy
-from hexmj.studies.base import Study
+from hexmj.plotting import CURVE, LEGEND, SERIES, head, picture, tidy
+from hexmj.studies.base import GROUND, Study
 from hexmj.studies.quantities import JOINTS, PHASES, SEGMENTS, UNITS, quantity_table
 from hexmj.sweep import Cell
 from hexmj.validate import whole
@@ -145,8 +145,7 @@ HEADS = ("quantity", "ours (95 %)", "insects", "verdict on the mean", "source")
 """Heads of the table."""
 
 OURS, INSECTS = "#1b6ca8", "#e08e1b"
-COLOURS = ("#1b6ca8", "#2a9d5c", "#6a4c93")
-"""Colours of directions or joints in turn."""
+"""Colours of a figure."""
 
 OVER_SPEED = {
     "phase, ipsilateral": "ipsilateral phase",
@@ -174,9 +173,7 @@ class Biology(Study):
     n_starts: int = field(default=20, kw_only=True)
     """Number of random starts, the same at every speed."""
 
-    hidden: ClassVar[tuple[str, ...]] = (
-        "grasp", "ground", "ground_height", "ground_at", "ground_length", "ground_seed",
-    )  # fmt: skip
+    hidden: ClassVar[tuple[str, ...]] = ("grasp", *GROUND)
 
     def __post_init__(self) -> None:
         whole("periods", self.periods, MEASURED + 1, 1000)
@@ -192,15 +189,14 @@ class Biology(Study):
     def cells(self) -> list[Cell]:
         """Return a cell for each speed."""
 
-        def cell(speed: float, velocity: float) -> Cell:
+        self.check_walks(self.velocities)
+        cells = []
+        for speed, velocity in zip(SPEEDS, self.velocities, strict=True):
             period = float(self.stride.periods(velocity))
             walks = self.walks(velocity, self.periods * period, self.conditions)
-            return Cell(
-                f"{speed:g}-mm-s", quantity_table, {"walks": walks, "measured": MEASURED * period}, 1 / velocity
-            )
-
-        self.check_walks(self.velocities)
-        return [cell(*pair) for pair in zip(SPEEDS, self.velocities, strict=True)]
+            own = {"walks": walks, "measured": MEASURED * period}
+            cells.append(Cell(f"{speed:g}-mm-s", quantity_table, own, 1 / velocity))
+        return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the quantities of the model beside those of the animals.
@@ -216,17 +212,13 @@ class Biology(Study):
         table = xr.concat(list(data), "speed").assign_coords(speed=("speed", list(SPEEDS), {"units": "mm/s"}))
         values = [table.value.sel(speed=row.speed, quantity=row.quantity).values for row in ANIMALS]
         ours = [_mean(starts, row.quantity) for starts, row in zip(values, ANIMALS, strict=True)]
+        fields = {"name": "quantity", "at": "speed", "animal_low": "low", "animal_high": "high"}
+        fields |= {name: name for name in ("depends", "built_in", "source")}
         columns = {
-            "name": [row.quantity for row in ANIMALS],
             "unit": [UNITS[row.quantity] for row in ANIMALS],
-            "at": [row.speed for row in ANIMALS],
-            "depends": [row.depends for row in ANIMALS],
+            **{name: [getattr(row, field) for row in ANIMALS] for name, field in fields.items()},
             **dict(zip(("mean", "low", "high"), np.transpose(ours), strict=True)),
-            "animal_low": [row.low for row in ANIMALS],
-            "animal_high": [row.high for row in ANIMALS],
             "verdict": [row.verdict(mean) for row, (mean, _, _) in zip(ANIMALS, ours, strict=True)],
-            "built_in": [row.built_in for row in ANIMALS],
-            "source": [row.source for row in ANIMALS],
             "walked": [np.count_nonzero(np.isfinite(starts)) for starts in values],
         }
         measured = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row")
@@ -299,7 +291,7 @@ def biology_figure(result: "xr.Dataset") -> "Figure":
     for panel, (name, label) in zip(axes[2:], OVER_SPEED.items(), strict=True):
         _over_speed(panel, result.value.sel(quantity=name), name)
         panel.set(ylabel=label, xlabel="speed [mm/s]")
-    axes[2].legend(frameon=False, fontsize=9)
+    axes[2].legend(**LEGEND)
     fewer = [f"{n} at {speed:g}" for speed, n in walked(result).items() if n < result.sizes["start"]]
     note = f"; whole strides of {', '.join(fewer)} mm/s" if fewer else ""
     head(figure, f"The walking insect beside measured ones; bars at {SPEED:g} mm/s", caption(result) + note)
@@ -308,17 +300,17 @@ def biology_figure(result: "xr.Dataset") -> "Figure":
 
 def _bars(axes: "Axes", values: "xr.DataArray", names: tuple[str, ...]) -> None:
     """Draw means and standard deviations over the starts, (quantity, start), a group for each pair of legs."""
-    for n, (name, colour) in enumerate(zip(names, COLOURS, strict=True)):
+    for n, name in enumerate(names):
         legs = values.sel(quantity=[f"{name}, {segment}" for segment in SEGMENTS])
         label = name.removesuffix(" impulse").removesuffix(" torque")
-        style = {"color": colour, "capsize": 2, "label": label, "yerr": legs.std("start", ddof=1)}
+        style = {"color": SERIES[n]["color"], "capsize": 2, "label": label, "yerr": legs.std("start", ddof=1)}
         axes.bar(np.arange(len(SEGMENTS)) + (n - 1) * 0.27, legs.mean("start"), 0.25, **style)
     axes.set_xticks(range(len(SEGMENTS)), [f"{segment} legs" for segment in SEGMENTS])
     axes.axhline(0.0, color="0.4", linewidth=0.8)
     axes.set_xlim(-0.55, len(SEGMENTS) - 0.45)
     low, high = axes.get_ylim()
     axes.set_ylim(low, low + 1.35 * (high - low))  # room for the legend
-    axes.legend(frameon=False, fontsize=9, loc="upper left")
+    axes.legend(**LEGEND, loc="upper left")
     tidy(axes)
     axes.set_axisbelow(True)
 

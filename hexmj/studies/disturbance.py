@@ -10,24 +10,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 import numpy as np
 
+from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.io import settings
 from hexmj.measures.figures import caption_of_at_least
 from hexmj.measures.tables import differences, frequency, velocity_axis
-from hexmj.plotting import frequency_curve, head, picture, tidy, velocity_ticks
+from hexmj.plotting import LEGEND, SERIES, VELOCITY, frequency_curve, head, picture, tidy, velocity_ticks
 from hexmj.studies.base import Study
-from hexmj.studies.disturbed_walks import (
-    GRID,
-    MOST_IMPULSE,
-    NO_DISTURBANCE,
-    PHYSICAL,
-    Answer,
-    Case,
-    Kind,
-    StableWalks,
-    Strategy,
-)
+from hexmj.studies.disturbed_walks import GRID, NO_DISTURBANCE, Answer, Case, Kind, StableWalks, Strategy
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration, check_reached, steps_within
 
@@ -35,28 +26,19 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-OBSERVATION_TIMES = ("whole", "short")
-"""Both begin with the disturbance. `whole` ends an observation time after the walk is at its velocity again, `short`
-an observation time after the disturbance."""
-
 MEASURES = {"kinematic": "planned_loss", "physical": "fall"}
 """Measure of FLSS -> the time whose frequency it is."""
 
-CLOSE = 1e-6
-"""Times that differ by less are equal, but for rounding [time units]."""
-
-STYLES: dict[str, dict[str, Any]] = {
-    "none": {"color": "#b3261e", "marker": "o", "linestyle": "-"},
-    "reorganise": {"color": "#1b6ca8", "marker": "s", "linestyle": "--"},
-    "slow_down": {"color": "#2a9d5c", "marker": "^", "linestyle": "-."},
-    "grasp": {"color": "#e08e1b", "marker": "D", "linestyle": (0, (5, 1))},
-}
+STYLES: dict[str, dict[str, Any]] = dict(zip(("none", "reorganise", "slow_down", "grasp"), SERIES, strict=False))
 """Styles of the strategies."""
 
-UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "linewidth": 1.4, "marker": "x", "markersize": 6}
-BESIDE = 0.05
-"""Room on both sides of the velocities."""
+PHYSICAL = ("push", "grasp")
+"""Disturbances and strategies that act on the body only."""
 
+MOST_IMPULSE = 80.0
+"""Largest impulse in multiples of m V_p; larger ones throw the insect into the air."""
+
+UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "linewidth": 1.4, "marker": "x", "markersize": 6}
 ROWS = {"kinematic": "kinematic", "physical": "falls (physical)"}
 """Measure -> label of its row of panels."""
 
@@ -93,25 +75,26 @@ class DisturbedWalks(Study):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        v, slows = self.observed[0], "slow_down" in self.strategies
+        (v, time), slows = self.observed, "slow_down" in self.strategies
         low = self.initial_velocity if slows else 0.0
         if not ((v > 0) & (v >= low)).all():
             raise InputError(f"velocities = {v.tolist()}; expected above 0 and at least the initial velocity, {low:g}")
         check_reached(v, self.stride, self.back if slows else None)
         if slows:
-            steps_within(self.observed[1] + self.back.duration(v), self.stride)
+            steps_within(time + self.back.duration(v), self.stride)
         if not self.kinematic and "push" in self.disturbances:
-            self._check_push()
-        replace(self.conditions, grasp=self.adhesion)
-        _ = self._cells()
+            from hexmj.physics.pushes import steps_pushed
 
-    def _check_push(self) -> None:
-        from hexmj.physics.pushes import steps_pushed
+            lasts = steps_pushed(self.conditions, self.stride)
+            if (steps_within(time, self.stride) < lasts).any():
+                least = lasts * self.stride.dt
+                raise InputError(f"observation_time = {self.observation_time!r}; a push lasts {least:g} time units")
+        _ = self.grasping, self.cases, [self._walks(velocity) for velocity in v]
 
-        lasts = steps_pushed(self.conditions, self.stride)
-        if (steps_within(self.observed[1], self.stride) < lasts).any():
-            least = lasts * self.stride.dt
-            raise InputError(f"observation_time = {self.observation_time!r}; a push lasts {least:g} time units")
+    @property
+    def grasping(self) -> Conditions:
+        """The conditions of the strategy 'grasp'."""
+        return replace(self.conditions, grasp=self.adhesion)
 
     @property
     def back(self) -> Acceleration:
@@ -125,27 +108,25 @@ class DisturbedWalks(Study):
 
     def cells(self) -> list[Cell]:
         """Return a cell for each velocity and case."""
-        grasping = not self.kinematic and "grasp" in self.strategies
-        self.check_walks(self.velocities, *([replace(self.conditions, grasp=self.adhesion)] if grasping else []))
-        return self._cells()
+        grasps = not self.kinematic and "grasp" in self.strategies
+        self.check_walks(self.velocities, *([self.grasping] if grasps else []))
+        cells = []
+        for velocity, time in zip(*self.observed, strict=True):
+            walks = self._walks(velocity)
+            for case in self.cases:
+                conditions = self.grasping if case.strategy == "grasp" else self.conditions
+                settings = {
+                    "case": case,
+                    "observation_time": time,
+                    "recovery": self.back if case.strategy == "slow_down" else None,
+                    "conditions": None if self.kinematic else conditions,
+                }
+                name = f"{case.disturbance}-{case.strategy}-V-{velocity:g}"
+                cells.append(Cell(name, walks.times, settings, work=time))
+        return cells
 
-    def _cells(self) -> list[Cell]:
-        def walks(velocity: float) -> StableWalks:
-            return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, GRID)
-
-        def cell(walks: StableWalks, case: Case, observation_time: float) -> Cell:
-            grasping = replace(self.conditions, grasp=self.adhesion) if case.strategy == "grasp" else self.conditions
-            settings = {
-                "case": case,
-                "observation_time": observation_time,
-                "recovery": self.back if case.strategy == "slow_down" else None,
-                "conditions": None if self.kinematic else grasping,
-            }
-            name = f"{case.disturbance}-{case.strategy}-V-{walks.velocity:g}"
-            return Cell(name, walks.times, settings, work=observation_time)
-
-        at = [(walks(v), time) for v, time in zip(*self.observed, strict=True)]
-        return [cell(stable, case, time) for stable, time in at for case in self.cases]
+    def _walks(self, velocity: float) -> StableWalks:
+        return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, GRID)
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the times of events, and how often they happen.
@@ -175,17 +156,12 @@ def every_case(
     Raises:
         InputError: a name or an impulse is not allowed, or no disturbance is left.
     """
-    for name, values, valid in (
-        ("disturbances", disturbances, get_args(Kind)),
-        ("strategies", strategies, get_args(Answer)),
-        ("impulses", impulses, ()),
-    ):
-        if len(set(values)) < len(values) or (valid and not {*values} <= {*valid}):
-            raise InputError(
-                f"{name} = {list(values)}; expected distinct values" + f" of {', '.join(valid)}" * bool(valid)
-            )
-    if not all(0 < impulse <= MOST_IMPULSE for impulse in impulses):
-        raise InputError(f"impulses = {list(impulses)}; expected above 0 and at most {MOST_IMPULSE:g} times m V_p")
+    chosen = {"disturbances": (disturbances, get_args(Kind)), "strategies": (strategies, get_args(Answer))}
+    for name, (values, valid) in chosen.items():
+        if len({*values}) < len(values) or not {*values} <= {*valid}:
+            raise InputError(f"{name} = {list(values)}; expected distinct values of {', '.join(valid)}")
+    if len({*impulses}) < len(impulses) or not all(0 < impulse <= MOST_IMPULSE for impulse in impulses):
+        raise InputError(f"impulses = {list(impulses)}; expected distinct values up to {MOST_IMPULSE:g} times m V_p")
     left_out = () if physical else PHYSICAL
     kinds: list[Kind] = [kind for kind in disturbances if kind not in left_out]
     answers: list[Strategy] = ["none", *(answer for answer in strategies if answer not in left_out)]
@@ -202,6 +178,8 @@ def every_case(
 def with_flss_after(data: "xr.Dataset") -> "xr.Dataset":
     """Add frequencies over (observation_time, velocity, case) to the times of events.
 
+    Both observation times begin with the disturbance: `whole` ends when the walk has been at its velocity again for
+    `duration`, and `short` ends `duration` after the disturbance.
     `kinematic` is the fraction of starts that lose static stability after the disturbance and within the observation
     time, of the `kinematic_reached` starts that have not lost it before, with its 95 % Wilson interval.
     `kinematic_buys` is what the strategy takes off the FLSS of the same disturbance without a strategy, over the starts
@@ -210,13 +188,13 @@ def with_flss_after(data: "xr.Dataset") -> "xr.Dataset":
     dims = ("observation_time", "velocity", "case")
     names = data.disturbance.values.tolist()
     without = [names.index(name) for name in names]  # the first case of a disturbance has no strategy
-    new: dict[str, Any] = {"observation_time": list(OBSERVATION_TIMES)}
+    new: dict[str, Any] = {"observation_time": ["whole", "short"]}
     time, back, duration = data.time.values, data.back.values, data.duration.values[:, None, None]
-    ends = np.stack((back + duration, time + duration))
-    for measure in [name for name, outcome in MEASURES.items() if outcome in data]:
+    ends, close = np.stack((back + duration, time + duration)), 1e-6  # times that differ by less are equal
+    for measure in [name for name in MEASURES if MEASURES[name] in data]:
         when = data[MEASURES[measure]].values
-        reached = when > time + CLOSE
-        lost = np.where(reached, when <= ends + CLOSE, np.nan)
+        reached = when > time + close
+        lost = np.where(reached, when <= ends + close, np.nan)
         new |= frequency(measure, lost, dims) | differences(f"{measure}_buys", lost[:, :, without], lost, dims)
         new[f"{measure}_reached"] = (dims[1:], reached.sum(axis=-1), {"units": "1"})
     return data.assign(new)
@@ -244,31 +222,29 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
     used = [strategy for strategy in STYLES if strategy in strategies]
     shifts = dict(zip(used, np.linspace(-0.012, 0.012, len(used)), strict=True))
     data = result.sel(observation_time="whole").sortby("velocity")
+    v = data.velocity.values
     for (row, column), axes in np.ndenumerate(panels):
         measure, kind = measures[row], kinds[column]
+        if row == 0:
+            axes.set_title(_title(kind), fontsize=10)
         if measure == "kinematic" and kind.startswith("push"):
             axes.axis("off")
             axes.text(0.5, 0.5, "a plan does not\nnotice a push", transform=axes.transAxes, ha="center", color="0.4")
             continue
         for case in np.flatnonzero(undisturbed):
-            axes.plot(data.velocity, data[measure].isel(case=case), **UNDISTURBED, zorder=5)
+            axes.plot(v, data[measure].isel(case=case), **UNDISTURBED, zorder=5)
         for case in np.flatnonzero((names == kind) & ((strategies != "grasp") | (measure == "physical"))):
             strategy = strategies[case]
-            x = data.velocity + shifts[strategy]
-            frequency_curve(axes, x, data.isel(case=case), measure, **STYLES[strategy])
-        v = data.velocity.values
+            frequency_curve(axes, v + shifts[strategy], data.isel(case=case), measure, **STYLES[strategy])
         velocity_ticks(axes, v)
-        axes.set(xlim=(v.min() - BESIDE, v.max() + BESIDE), ylim=(-0.03, 1.03))
+        axes.set(xlim=(v.min() - 0.05, v.max() + 0.05), ylim=(-0.03, 1.03))
+        axes.set(xlabel=VELOCITY, ylabel=f"FLSS, {ROWS[measure]}")
+        axes.label_outer()
         tidy(axes)
-    for column, kind in enumerate(kinds):
-        panels[0, column].set_title(_title(kind), fontsize=10)
-        panels[-1, column].set_xlabel("velocity $V_r / V_p$")
-    for row, measure in enumerate(measures):
-        panels[row, 0].set_ylabel(f"FLSS, {ROWS[measure]}")
     entries = [Line2D([], [], markersize=4, label=name.replace("_", " "), **STYLES[name]) for name in used]
     entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
     least = min(int(data[f"{measure}_reached"].min()) for measure in measures)
-    figure.legend(handles=entries, frameon=False, fontsize=9, loc="outside right center", title="strategy")
+    figure.legend(handles=entries, **LEGEND, loc="outside right center", title="strategy")
     caption = "; ".join(filter(None, [caption_of_at_least(least, result), strategies_in_words(result)]))
     head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", caption)
     return figure

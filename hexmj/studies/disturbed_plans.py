@@ -93,11 +93,6 @@ class Rest:
     standing: np.ndarray
     """(step, leg)."""
 
-    @property
-    def moves_back(self) -> np.ndarray:
-        """(step, leg) tips that move to the rear in each step; the end of such a swing is unknown."""
-        return np.diff(self.tips, axis=0, prepend=self.tips[:1]) < 0.0
-
 
 def collect_postures(controller: Controller, velocity: float, seed: int, stride: Stride) -> Postures:
     """Return statically stable postures, evenly spread over one period of a steady-state gait at this velocity.
@@ -108,9 +103,7 @@ def collect_postures(controller: Controller, velocity: float, seed: int, stride:
     gait = steady_state_gait(controller, velocity, n_starts=CANDIDATES, seed=seed, stride=stride)
     stable = gait.periodic & gait.stable
     if not stable.any():
-        raise InputError(
-            f"strategy 'reorganise': no start of {controller.name} reaches a stable periodic gait at V = {velocity:g}"
-        )
+        raise InputError(f"strategy 'reorganise': no stable periodic gait of {controller.name} at V = {velocity:g}")
     start = int(np.argmax(stable))
     plan = begin(controller, draw_starts(CANDIDATES, seed, stride)[start : start + 1], velocity, stride)
     plan.advance(round(gait.reached[start] / stride.dt))
@@ -118,11 +111,6 @@ def collect_postures(controller: Controller, velocity: float, seed: int, stride:
     rows = np.linspace(0, len(walk.time), POSTURES, endpoint=False).astype(int)
     rows = rows[walk_margin(walk)[rows, 0] > 0]
     return Postures(walk.x[rows, 0], walk.stance[rows, 0])
-
-
-def stand(tips: np.ndarray, steps: int) -> Rest:
-    """Return a rest in which all legs stand at `tips`, (leg,) [mm]."""
-    return Rest(np.tile(tips, (steps, 1)), np.ones((steps, 6), dtype=bool))
 
 
 def reorganise(tips: np.ndarray, goal: np.ndarray, stride: Stride) -> Rest:
@@ -262,7 +250,8 @@ class DisturbedPlan:
 
     def _rest(self, tips: np.ndarray) -> Rest:
         """Return the rest of a start that is halted with these tips, (leg,) [mm]."""
-        pause = stand(tips, round(PAUSE / self.stride.dt))
+        steps = round(PAUSE / self.stride.dt)
+        pause = Rest(np.tile(tips, (steps, 1)), np.ones((steps, 6), dtype=bool))
         if not self._postures:
             return pause
         moves = reorganise(tips, self._postures.tips[self._postures.nearest(tips)], self.stride)
@@ -290,7 +279,8 @@ class DisturbedPlan:
                 walk.velocity[:, start] = 0.0
                 walk.x[:, start], walk.stance[:, start] = rest.tips[rows], rest.standing[rows]
                 walk.y[:, start], walk.height[:, start] = self._held[start], np.nan
-                walk.aep[:, start] = np.where(rest.moves_back[rows], np.nan, self.stride.aep0)
+                back = np.diff(rest.tips, axis=0, prepend=rest.tips[:1]) < 0.0  # the end of such a swing is unknown
+                walk.aep[:, start] = np.where(back[rows], np.nan, self.stride.aep0)
         return walk
 
 

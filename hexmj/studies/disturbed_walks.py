@@ -5,30 +5,18 @@ An obstacle is "the termination of motion. Then the motion is initiated from new
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.planning import REPEATED, advanced, begin, check_repeats, planned_losses
-from hexmj.controllers.protocol import (
-    Controller,
-    SteerableController,
-    check_steerable,
-)
+from hexmj.controllers.protocol import Controller, SteerableController, check_steerable
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
 from hexmj.starts import draw_starts
-from hexmj.studies.disturbed_plans import (
-    NEVER,
-    Disturbance,
-    Disturbed,
-    DisturbedPlan,
-    Kind,
-    Postures,
-    collect_postures,
-)
+from hexmj.studies.disturbed_plans import NEVER, Disturbance, Disturbed, Kind, Postures, collect_postures
 from hexmj.timing import Acceleration, Stride, steps_within
 
 if TYPE_CHECKING:
@@ -42,12 +30,6 @@ Strategy = Literal["none"] | Answer
 
 NO_DISTURBANCE = "undisturbed"
 """Name of the case in which nothing happens."""
-
-PHYSICAL = ("push", "grasp")
-"""Disturbances and strategies that act on the body only."""
-
-MOST_IMPULSE = 80.0
-"""Largest impulse in multiples of m V_p; larger ones throw the insect into the air."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +58,8 @@ MOST_DRAWN = 200_000
 GRID = 20
 """Steps of which every time of a disturbance is a multiple: 25 ms at the default V_p, the duration of a push."""
 
-CHUNK = 50
-"""Steps planned at a time in the search for a protracting leg."""
-
-MOST_PERIODS = 100
-"""Most periods of a single leg in the search for a protracting leg."""
+CHUNK, MOST_PERIODS = 50, 100
+"""Steps planned at a time, and most periods of a single leg, in the search for a protracting leg."""
 
 
 class TooFewStable(InputError):
@@ -106,20 +85,20 @@ def find_stable_starts(
 ) -> StableStarts:
     """Return the first starts whose plan is stable until the disturbance.
 
+    Times of the disturbance are uniform within one period of a single leg, after `SETTLED` of them.
+
     Args:
-        controller: plans the walks.
+        controller: plans the walks at V_r = `velocity`.
         velocity: V_r.
         n_starts: number of starts to find.
         seed: of starts, times and legs.
         stride: of the plans.
-        grid: steps of which every time is a multiple. Times are uniform within one period of a single leg, after
-            `SETTLED` of them.
+        grid: steps of which every time is a multiple.
 
     Raises:
         TooFewStable: fewer than `n_starts` of `MOST_DRAWN` starts are stable for so long.
     """
-    period = stride.periods(velocity) / stride.dt
-    drawn = 0
+    period, drawn = stride.periods(velocity) / stride.dt, 0
     while drawn < MOST_DRAWN >= n_starts:
         drawn = min(max(2 * drawn, n_starts), MOST_DRAWN)
         starts = draw_starts(drawn, seed, stride)
@@ -154,12 +133,12 @@ def disturbance_of(
                 f"disturbance = 'leg': no leg of {controller.name} protracts within {MOST_PERIODS} periods in"
                 f" {(step == NEVER).sum()} of {len(step)} starts"
             )
-        first = plan.done + 1
+        first, every = plan.done + 1, np.arange(len(step))
         up = ~advanced(plan, CHUNK).stance
         due = (first + np.arange(CHUNK))[:, None] >= stable.step
         row = np.argmax(up.any(axis=2) & due, axis=0)
-        legs = up[row, np.arange(len(step))]
-        found = (step == NEVER) & legs.any(axis=1) & due[row, np.arange(len(step))]
+        legs = up[row, every]
+        found = (step == NEVER) & legs.any(axis=1) & due[row, every]
         nth = np.floor(stable.draw * legs.sum(axis=1)).astype(int)
         chosen = np.argmax(legs & (np.cumsum(legs, axis=1) == nth[:, None] + 1), axis=1)
         step, leg = np.where(found, first + row, step), np.where(found, chosen, leg)
@@ -247,15 +226,14 @@ class StableWalks:
         postures = self.postures if case.strategy == "reorganise" else None
         disturbed = Disturbed(self.planner, disturbance, postures, slows=recovery is not None)
         check_repeats(disturbed, self.found.starts, self.velocity, REPEATED, self.stride, recovery)
-        ahead = self._plan(disturbed, self.found.starts, recovery, threads)
+        ahead: Any = begin(disturbed, self.found.starts, self.velocity, self.stride, recovery, threads)
         advanced(ahead, int(disturbance.step.max()) + 1)
         back = ahead.resumed * self.stride.dt + (recovery.duration(self.velocity) if recovery else 0.0)
         end = float(back.max() + observation_time)
         starts, disturbed = self.found.starts[which], replace(disturbed, disturbance=disturbance.of(which))
         time = disturbed.disturbance.step * self.stride.dt
-        first = planned_losses(
-            self._plan(disturbed, starts, recovery, threads), steps_within(end, self.stride), threads
-        )
+        plan = begin(disturbed, starts, self.velocity, self.stride, recovery, threads)
+        first = planned_losses(plan, steps_within(end, self.stride), threads)
         lost = np.where(first > 0, first * self.stride.dt, np.inf)
         times = {"time": time, "back": back[which], "planned_loss": lost}
         if conditions:
@@ -268,9 +246,3 @@ class StableWalks:
             name: ("start", values, {"units": "time unit", "long_name": TIMES[name]}) for name, values in times.items()
         }
         return xr.Dataset(columns).assign(drawn=self.found.drawn)
-
-    def _plan(
-        self, disturbed: Disturbed, starts: np.ndarray, recovery: Acceleration | None, threads: int | None
-    ) -> DisturbedPlan:
-        plan = begin(disturbed, starts, self.velocity, self.stride, recovery, threads)
-        return plan  # pyright: ignore[reportReturnType]

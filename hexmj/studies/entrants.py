@@ -82,12 +82,10 @@ def entrants(names: Sequence[str], load: Callable[[str], Controller] = load_cont
     Raises:
         InputError: there is no such controller, or it has no ideal start.
     """
-    found = {name: load(name.removesuffix(IDEAL)) for name in names}
-    short = short_names({name.removesuffix(IDEAL): controller for name, controller in found.items()})
-    return {
-        short[name.removesuffix(IDEAL)] + IDEAL * name.endswith(IDEAL): Entrant(controller, name.endswith(IDEAL))
-        for name, controller in found.items()
-    }
+    plain = {name: name.removesuffix(IDEAL) for name in names}
+    found = {name: load(name) for name in plain.values()}
+    short = short_names(found)
+    return {short[own] + IDEAL * (own != name): Entrant(found[own], ideal=own != name) for name, own in plain.items()}
 
 
 def short_names(found: Mapping[str, Controller]) -> dict[str, str]:
@@ -96,12 +94,9 @@ def short_names(found: Mapping[str, Controller]) -> dict[str, str]:
     Args:
         found: controllers by the names that `load_controller` was given.
     """
-    known = {*known_names()}
-
-    def own(name: str, controller: Controller) -> str:
+    known, short = {*known_names()}, {}
+    for name, controller in found.items():
         varied = VARIED.fullmatch(name)
-        return name if (varied["name"] if varied else name) in known else controller.name
-
-    short = {name: own(name, controller) for name, controller in found.items()}
+        short[name] = name if (varied["name"] if varied else name) in known else controller.name
     often = Counter(short.values())
     return {name: name if often[shown] > 1 else shown for name, shown in short.items()}

@@ -10,7 +10,7 @@ from hexmj.controllers.wrappers import LegLost, PoorSenses
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.tables import FRESH, PERIODS
-from hexmj.studies.base import Study
+from hexmj.studies.base import GROUND, Study
 from hexmj.studies.disturbed_walks import Case
 from hexmj.studies.entrants import Entrant
 from hexmj.studies.league_cells import EntrantWalks
@@ -34,33 +34,20 @@ KINEMATIC = 0.05
 REGIMES = 50
 """Most starts whose steady-state gait is measured."""
 
-IMPULSE = 40.0
-"""Impulse of the push, in multiples of m V_p."""
+DELAY, NOISE = 0.02, 0.1
+"""Delay of the sensed legs [s], and standard deviation of the error of sensed tips, as a part of AEP_0 - PEP_0."""
 
-DELAY = 0.02
-"""Delay of the sensed legs [s]."""
-
-NOISE = 0.1
-"""Standard deviation of the error of sensed tips, as a part of AEP_0 - PEP_0."""
-
-DISTURBED: dict[str, Case] = {
-    "halt": Case("halt", "none"),
-    "leg": Case("leg", "none"),
-    "push": Case("push", "none", IMPULSE),
-}
+DISTURBED = {"halt": Case("halt", "none"), "leg": Case("leg", "none"), "push": Case("push", "none", impulse=40.0)}
 """Disturbances of walks whose plan is stable until then, each at a time of its own."""
 
 GROUNDS = ("step", "rough")
 """Obstacles, as near as the body allows: even slow walks reach them with all legs."""
 
-HEIGHT = 0.3
-"""Height of the obstacles, in standing heights of the body."""
+HEIGHT, LOAD = 0.3, 1.0
+"""Height of the obstacles, in standing heights of the body, and load of the trial, in weights of the body."""
 
 HELD = 1.2
 """Height at which a lost leg is held, in standing heights of the body or of the walk, whichever is higher."""
-
-LOAD = 1.0
-"""Load of the trial, in weights of the body."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +75,7 @@ class League(Study):
     seed: int = field(default=FRESH, kw_only=True)
     """Seed of the random starts."""
 
-    hidden: ClassVar[tuple[str, ...]] = ("load", "ground", "ground_height", "ground_at", "ground_length", "ground_seed")
+    hidden: ClassVar[tuple[str, ...]] = ("load", *GROUND)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -139,26 +126,24 @@ class League(Study):
             walks = EntrantWalks(entrant, velocity, self.observation_time, n_starts, self.seed, self.stride)
             return Cell(f"{entrant.controller.name}-{name}", getattr(walks, function), own, float(cost * n_starts))
 
-        at = [(float(v), float(time)) for v, time in zip(*self.observed, strict=True)]
-        walked = {"controller": entrant.controller, "conditions": self.conditions}
-        for v, time in at:
+        own = {"controller": entrant.controller, "conditions": self.conditions}
+        for v, time in zip(*(axis.tolist() for axis in self.observed), strict=True):
             yield f"kinematic {v}", cell(f"kinematic-V-{v:g}", "losses", v, every, time * KINEMATIC)
-        for v, time in at:
-            yield f"physics {v}", cell(f"physics-V-{v:g}", "outcomes", v, few, time, **walked)
+            yield f"physics {v}", cell(f"physics-V-{v:g}", "outcomes", v, few, time, **own)
+            if not entrant.ideal:
+                cost, gaits = 20 * time * KINEMATIC, min(every, REGIMES)
+                yield f"gait {v}", cell(f"gait-V-{v:g}", "gaits", v, gaits, cost, periods=self.periods)
         if entrant.ideal:
             return
-        for v, time in at:
-            gaits = min(every, REGIMES)
-            yield f"gait {v}", cell(f"gait-V-{v:g}", "gaits", v, gaits, 20 * time * KINEMATIC, periods=self.periods)
-        ends = dict(zip(("low", "high"), RANGE, strict=True))
-        yield "range", cell("range", "losses_over_range", RANGE[0], every, 600 * KINEMATIC, **ends)
+        low, high = RANGE
+        yield "range", cell("range", "losses_over_range", low, every, 600 * KINEMATIC, low=low, high=high)
         if self.accelerating:
-            own = {"acceleration": Acceleration()}
-            yield "accelerated", cell("accelerated", "losses", FINAL, every, 10_000 * KINEMATIC, **own)
+            cost = 10_000 * KINEMATIC
+            yield "accelerated", cell("accelerated", "losses", FINAL, every, cost, acceleration=Acceleration())
         v, few = self.trial_velocity, min(self.trial_starts, self.n_starts)
         for trial, leg in LEGS_LOST.items():
-            name = f"kinematic-{trial}"
-            yield f"kinematic, {trial}", cell(name, "losses", v, every, 200 * KINEMATIC, leg_lost=leg)
+            walks = cell(f"kinematic-{trial}", "losses", v, every, 200 * KINEMATIC, leg_lost=leg)
+            yield f"kinematic, {trial}", walks
         for trial, function, cost, own in self._tried(entrant):
             yield trial, cell(trial, function, v, few, cost, **own)
 

@@ -61,13 +61,7 @@ class EntrantWalks:
     def losses(
         self, acceleration: Acceleration | None = None, leg_lost: int | None = None, threads: int | None = None
     ) -> "xr.Dataset":
-        """Return whether each start loses static stability in its planned walk, `lost`.
-
-        Args:
-            acceleration: Eq. 11.
-            leg_lost: index of a lost leg.
-            threads: by default one per core.
-        """
+        """Return whether each start loses static stability in its planned walk, `lost`, perhaps without a leg."""
         controller = self.entrant.controller if leg_lost is None else LegLost(self.entrant.controller, leg_lost)
         duration = self.duration + (acceleration.duration(self.velocity) if acceleration else 0.0)
         how = {"stride": self.stride, "acceleration": acceleration, "threads": threads}
@@ -82,11 +76,7 @@ class EntrantWalks:
         return _lost(first_loss(starts, self.entrant.controller, velocity, duration, **how))
 
     def gaits(self, periods: int, threads: int | None = None) -> "xr.Dataset":
-        """Return the steady-state gait of each start.
-
-        Args:
-            periods: as of `gaits.steady_state_gait`.
-            threads: by default one per core.
+        """Return the steady-state gait of each start after so many `periods`, see `gaits.steady_state_gait`.
 
         Returns:
             `reached`, the time from which on the gait lasts [time units], or inf; whether it is `stable`; and, NaN

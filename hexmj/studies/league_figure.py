@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from hexmj.measures.figures import caption, starts_in_words
-from hexmj.plotting import head, in_figure, picture
+from hexmj.plotting import head, heat_map, in_figure, interval, picture, velocity_columns
 from hexmj.studies.standings import MEASURES, by_rank, from_one, place
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
 
 SHARES = (0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
 """Between these shares a colour is the same."""
@@ -22,9 +24,6 @@ PHASES = (*np.arange(-1, 26, 2) / 24,)
 
 FEWER, NOTHING = "\N{BULLET}", "\N{EN DASH}"
 """Marks of a cell with missing walks, and of one without a number."""
-
-BAR: dict[str, Any] = {"location": "bottom", "format": "%g"}
-"""Options of the colour bars below the panels."""
 
 BAR_HEIGHT = 0.25
 """Height of the place of a colour bar [inch]."""
@@ -61,11 +60,8 @@ def league_figure(result: "xr.Dataset") -> "Figure":
         for name, title in titles.items()
     ]  # fmt: skip
     figure, axes = _rows(shown, (1.0, 1.0, 1.0, 0.95))
-    images = [_heat(one, panel) for one, panel in zip(axes, panels, strict=False)]
-    for one in axes[:3]:
-        _velocities(one, shown)
-    how: dict[str, Any] = BAR | {"fraction": BAR_HEIGHT / figure.get_figheight(), "aspect": 55, "shrink": 0.7}
-    figure.colorbar(images[0], ax=axes[:3], **how).set_label("share of the starts", fontsize=9)
+    images = [_heat(one, panel, shown) for one, panel in zip(axes, panels, strict=False)]
+    _colour_bar(figure, axes[:3], images[0], "share of the starts", aspect=55, shrink=0.7)
     _dots(axes[3], shown)
     heading = "The league: who loses static stability, and who falls; best in physics first, with the ranks there"
     _head(figure, heading, result, in_figure(from_one(shown)), _nothing(panels), _missing(shown))
@@ -88,13 +84,9 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
     figure, axes = _rows(shown, (1.33, 1.0, 1.0, 1.0))
     labels = ("share of the starts", "share of the starts", "phase", "")
     for one, panel, label in zip(axes, panels, labels, strict=True):
-        how = {"fraction": BAR_HEIGHT / figure.get_figheight(), "aspect": 23}
-        bar = figure.colorbar(_heat(one, panel), ax=one, **BAR, **how)
-        bar.ax.tick_params(labelsize=7)
+        bar = _colour_bar(figure, one, _heat(one, panel, shown), label, aspect=23)
         if panel.colours == "twilight":
             bar.set_ticks([0.0, 0.25, 0.5, 0.75, 1.0])
-        bar.set_label(label, fontsize=9)
-        _velocities(one, shown)
     turned: dict[str, Any] = {"rotation": 60, "ha": "right", "rotation_mode": "anchor", "fontsize": 8}
     axes[0].set_xticks(range(shown.sizes["trial"]), shown.trial.values, **turned)
     axes[0].set_xlabel("")
@@ -143,45 +135,41 @@ def _missing(shown: "xr.Dataset") -> str:
     found = [f"{in_figure(name)} {count:g}" for name, count in zip(of.entrant.values, of.values, strict=True) if count]
     if not found:
         return ""
-    others = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
-    names = f"{', '.join(found[:NAMED])}{others}"
+    names = ", ".join(found[:NAMED]) + (f" and {len(found) - NAMED} more" if len(found) > NAMED else "")
     return f"{FEWER} of fewer starts: walks are missing that diverged or were out of reach (in all {names})"
 
 
-def _velocities(axes: "Axes", shown: "xr.Dataset") -> None:
-    """Columns are velocities."""
-    axes.set_xticks(range(shown.sizes["velocity"]), [f"{v:g}" for v in shown.velocity.values], fontsize=8)
-    axes.set_xlabel("velocity $V_r / V_p$", fontsize=9)
-
-
-def _heat(axes: "Axes", panel: Panel) -> Any:
+def _heat(axes: "Axes", panel: Panel, shown: "xr.Dataset") -> "AxesImage":
     """Draw numbers as colours, with a dash for no number and a mark for missing walks."""
     import matplotlib
     from matplotlib.colors import BoundaryNorm
 
     colours = matplotlib.colormaps[panel.colours].with_extremes(bad="0.93")
-    how: dict[str, Any] = {"cmap": colours, "norm": BoundaryNorm(panel.levels, colours.N), "aspect": "auto"}
-    image = axes.imshow(panel.values, **how)
-    for row, column in np.argwhere(~np.isfinite(panel.values) | panel.fewer):
-        known = np.isfinite(panel.values[row, column])
-        shade = image.cmap(image.norm(panel.values[row, column])) if known else (1.0, 1.0, 1.0, 1.0)
-        dark = np.dot(shade[:3], [0.3, 0.59, 0.11]) < 0.5
-        colour = "white" if dark else "0.1" if known else "0.6"
-        axes.text(column, row, FEWER if known else NOTHING, ha="center", va="center", fontsize=8, color=colour)
-    for edge in range(1, panel.values.shape[0]):
+    known, fewer = np.isfinite(panel.values), np.broadcast_to(panel.fewer, panel.values.shape)
+    texts = np.where(known, np.where(fewer, FEWER, ""), NOTHING)
+    image = heat_map(axes, panel.values, texts, cmap=colours, norm=BoundaryNorm(panel.levels, colours.N))
+    for edge in range(1, len(known)):
         axes.axhline(edge - 0.5, color="white", linewidth=0.6)
     axes.set_title(panel.title, fontsize=10)
-    axes.tick_params(length=0)
-    axes.spines[:].set_visible(False)
+    velocity_columns(axes, shown.velocity.values)
     return image
+
+
+def _colour_bar(figure: "Figure", axes: Any, image: "AxesImage", label: str, **options: Any) -> "Colorbar":
+    """Draw the scale of a heat map below its panels."""
+    height = BAR_HEIGHT / figure.get_figheight()
+    bar = figure.colorbar(image, ax=axes, location="bottom", format="%g", fraction=height, **options)
+    bar.ax.tick_params(labelsize=7)
+    bar.set_label(label, fontsize=9)
+    return bar
 
 
 def _dots(axes: "Axes", shown: "xr.Dataset") -> None:
     """Draw J_N and the FLSS of accelerating walks with their intervals."""
     for name, (colour, marker, beside) in POINTS.items():
-        low, middle, high = (shown[name + end].values for end in ("_low", "", "_high"))
+        middle, ends = interval(shown, name)
         style: dict[str, Any] = {"color": colour, "fmt": marker, "markersize": 4, "capsize": 2.0}
-        axes.errorbar(middle, np.arange(len(middle)) + beside, xerr=[middle - low, high - middle], **style)
+        axes.errorbar(middle, np.arange(len(middle)) + beside, xerr=ends, **style)
     for row in range(shown.sizes["entrant"]):
         axes.axhline(row, color="0.93", linewidth=0.8, zorder=0)
     axes.set(xlim=(-0.03, 1.03))

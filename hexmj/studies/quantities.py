@@ -76,9 +76,6 @@ PLATE = 0.01
 KEPT = 1100
 """Memory of a physics step of a start [bytes]."""
 
-TO_MN_MM, TO_J_PER_KG_M = 1e-3, 1e-3
-"""Factors from g mm^2/s^2 and from mm/s^2."""
-
 HOP = 0.12
 """A foot swings if it is off the ground for more than this part of the time from PEP_0 to AEP_0."""
 
@@ -92,7 +89,7 @@ class Strides:
     step: float
     """Physics step [s]."""
     hop: float
-    """Rows off the ground beyond which a foot swings, see `HOP`."""
+    """Rows off the ground beyond which a foot swings, see `rows_of_a_hop`."""
     qpos: np.ndarray
     """(row, position) before each step."""
     velocity: np.ndarray
@@ -109,6 +106,11 @@ class Strides:
     """Rows between samples of `ground`: a step of the plan."""
     ground: np.ndarray
     """(sample, leg, 3) forces of the ground on the feet, in the world [g mm/s^2]."""
+
+    def averaged(self, values: np.ndarray, time: float, every: int = 1) -> np.ndarray:
+        """Return moving means of values, (n,), in every so many rows, over a time [s]."""
+        width = max(1, round(time / self.step / every))
+        return np.convolve(values, np.ones(width) / width, "valid")
 
     def lifted(self, leg: int) -> np.ndarray:
         """Return the rows in which a leg begins to swing, if the strides repeat."""
@@ -135,8 +137,7 @@ def last_strides(
 
     Args:
         settled: starts at rest, with sensors of the feet's forces.
-        controller: plans the walks.
-        velocity: V_r.
+        controller: plans the walks at V_r = `velocity`.
         duration: observation time [time units].
         measured: last part of it [time units].
         threads: by default one per core.
@@ -244,7 +245,7 @@ def _gait(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     lags = [(begun[k] - begun[j]) * strides.step / period % 1.0 for j, k in PAIRS.values()]
     return {
         "speed": speed,
-        "ripple: least over mean speed": _seen(ahead, FRAME / strides.step).min() / speed,
+        "ripple: least over mean speed": strides.averaged(ahead, FRAME).min() / speed,
         "period": period,
         "duty factor": duty,
         "way of a standing foot": speed * period * duty,
@@ -258,7 +259,7 @@ def _forces(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     share = strides.ground / compiled.weight
     level = turned(share[..., :2], -heading(strides.qpos[:: strides.every, 3:7]))
     ahead, inward, up = level[..., 0], -np.array(SIDE) * level[..., 1], share[..., 2]
-    peaks = np.array([_seen(leg, PLATE / strides.step / strides.every).max() for leg in up.T])
+    peaks = np.array([strides.averaged(leg, PLATE, strides.every).max() for leg in up.T])
     peaks = np.where((up > 0).any(axis=0), peaks, np.nan)
     pairs = peaks.reshape(2, 3).mean(axis=0)
     impulses = {"vertical": up, "fore-aft": ahead, "inward": inward}
@@ -282,7 +283,7 @@ def _torques(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     course = [_course(torque[:, leg, 1], strides, leg) for leg in range(6)]
     past = [np.flatnonzero(torques > 0.5 * torques.max()) for torques in course]
     return {
-        **{f"{joint} torque": TO_MN_MM * legs for joint, legs in zip(JOINTS, mean.T, strict=True)},
+        **{f"{joint} torque": 1e-3 * legs for joint, legs in zip(JOINTS, mean.T, strict=True)},
         **{f"{joint} torque against its movement": 100.0 * x for joint, x in zip(JOINTS, against, strict=True)},
         "work of standing legs at the coxa-trochanter": 100.0 * work[1] / work.sum(),
         "coxa-trochanter torque past half its peak, from": [rows[0] if len(rows) else np.nan for rows in past],
@@ -316,10 +317,8 @@ def _posture(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     return {
         "height of the coxae": (height - np.maximum(np.stack(below, axis=1), 0.0)).mean(axis=0),
         "pitch of the thorax": pitch.mean(),
-        "pitch, range over the strides": np.ptp(_seen(pitch, FRAME / strides.step)),
-        "height of the centre of mass, range over the strides": np.ptp(
-            _seen(strides.centre[:, 2], FRAME / strides.step)
-        ),
+        "pitch, range over the strides": np.ptp(strides.averaged(pitch, FRAME)),
+        "height of the centre of mass, range over the strides": np.ptp(strides.averaged(strides.centre[:, 2], FRAME)),
     }
 
 
@@ -329,15 +328,15 @@ def _work(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     power, gravity = strides.torques * strides.turning, compiled.weight / compiled.body.mass
     rate = compiled.weight * _ahead(strides).mean()
     positive = np.maximum(power, 0.0).sum(axis=1).mean() / rate
-    centre = np.stack([_seen(axis, FRAME / strides.step) for axis in strides.centre.T], axis=1)
+    centre = np.stack([strides.averaged(axis, FRAME) for axis in strides.centre.T], axis=1)
     speed = np.linalg.norm(np.diff(centre, axis=0), axis=1) / strides.step
     gained = np.maximum(np.diff(0.5 * speed**2 + gravity * centre[1:, 2]), 0.0).sum()
     gained *= 1.0 + compiled.conditions.load  # the load moves with the body
     return {
         "cost of transport, positive work": positive,
         "cost of transport, all work": np.abs(power).sum(axis=1).mean() / rate,
-        "positive work of the joints": TO_J_PER_KG_M * gravity * positive,
-        "work on the centre of mass": TO_J_PER_KG_M * gained / np.linalg.norm(centre[-1, :2] - centre[0, :2]),
+        "positive work of the joints": 1e-3 * gravity * positive,
+        "work on the centre of mass": 1e-3 * gained / np.linalg.norm(centre[-1, :2] - centre[0, :2]),
     }
 
 
@@ -352,9 +351,3 @@ def _coxae(compiled: "CompiledBody") -> np.ndarray:
 
     first = joint_numbers(compiled.model, compiled.body)[:, 0]
     return posed(compiled.model, compiled.home).xpos[compiled.model.jnt_bodyid[first]]
-
-
-def _seen(values: np.ndarray, rows: float) -> np.ndarray:
-    """Return moving means of values, (row,), over a number of rows."""
-    width = max(1, round(rows))
-    return np.convolve(values, np.ones(width) / width, "valid")

@@ -1,6 +1,6 @@
 """Dynamic stability maps: physical FLSS over the velocity and one condition, with the same starts in every cell."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -15,7 +15,8 @@ from hexmj.measures.cells import UNITS, WalkSettings
 from hexmj.measures.compare import BESIDE, MEASURES
 from hexmj.measures.figures import caption
 from hexmj.measures.tables import differences, frequency, happened, over_start, velocity_axis
-from hexmj.plotting import head, picture
+from hexmj.plotting import LEGEND, head, heat_map, picture, velocity_columns
+from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 from hexmj.studies.base import Study
 from hexmj.studies.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
@@ -25,10 +26,7 @@ from hexmj.validate import choice, distinct
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from hexmj.measures.physical import PhysicalWalk
 
 Over = Literal["vp", "step_height", "standing_height", "friction", "load", "centre_of_mass"]
 """Conditions that a map can vary."""
@@ -59,29 +57,23 @@ FLSS = MEASURES | BESIDE | {"static": "static_loss"}
 BLOCK = 100
 """Starts walked at a time: their walks are kept whole, 0.5 GB at V = 0.1."""
 
-COLOURS = {
-    "never_lost": "#e4e4e4",
-    "still_standing": "#cde8c9",
-    "too_short": "#8fce8a",
-    "landed_in_time": "#46a35e",
-    "caught": "#14663a",
-    "tipped_behind": "#f5a25d",
-    "tipped_ahead": "#f6d55c",
-    "thrown": "#b3261e",
-    "unplanned": "#6a4c93",
-    "narrow": "#b79bd6",
+LOOKS: dict[str, tuple[str, str | None]] = {
+    "never_lost": ("#e4e4e4", None),
+    "still_standing": ("#cde8c9", None),
+    "too_short": ("#8fce8a", None),
+    "landed_in_time": ("#46a35e", None),
+    "caught": ("#14663a", None),
+    "tipped_behind": ("#f5a25d", "//"),
+    "tipped_ahead": ("#f6d55c", "\\\\"),
+    "thrown": ("#b3261e", "xx"),
+    "unplanned": ("#6a4c93", ".."),
+    "narrow": ("#b79bd6", "--"),
 }
-"""Mechanism -> colour: grey for no event, green for saved starts, warm for falls after a planned loss, violet for
-other falls."""
+"""Mechanism -> colour and hatch: grey for no event, green for saved starts, warm for falls after a planned loss, violet
+for other falls; falls are hatched, for readers without colours."""
 
-HATCHES = {"tipped_behind": "//", "tipped_ahead": "\\\\", "thrown": "xx", "unplanned": "..", "narrow": "--"}
-"""Mechanism of a fall -> hatch, for readers without colours."""
-
-MARKS: Mapping[str, Mapping[str, Any]] = {
-    "physical": {"color": "0.1", "markersize": 22, "markeredgewidth": 1.8},
-    "toppled": {"color": "white", "markersize": 14, "markeredgewidth": 1.8},
-}
-"""Measure -> style of the mark above which its starts lie."""
+MARKS = {"physical": ("0.1", 22), "toppled": ("white", 14)}
+"""Measure -> colour and size of the mark above which its starts lie."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +185,7 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
     """
     stands = standing_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
     blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
-    parts = [part for block in blocks for part in _within_reach(walks, block, threads)]
+    parts = [part for block in blocks for part in _by_halves(block, lambda which: _fates(walks, which, threads))]
     if not parts:
         value = walks.conditions.values()[over]
         raise InputError(f"{over} = {value:g}; no start stands and reaches its tips at V = {walks.velocity:g}")
@@ -209,40 +201,26 @@ def standing_starts(
     n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None
 ) -> np.ndarray:
     """Return the indices of the seed's starts that come to rest on six feet; cached for the other velocities."""
-    return np.flatnonzero(_stands(draw_starts(n_starts, seed, stride), conditions, stride, threads))
-
-
-def _stands(starts: np.ndarray, conditions: Conditions, stride: Stride, threads: int | None) -> np.ndarray:
-    """Find the starts that come to rest on six feet, (start,), by halving; one that diverges is an error."""
     from hexmj.physics.settle import settle
 
+    starts, everyone = draw_starts(n_starts, seed, stride), np.arange(n_starts)
+    parts = [part for part, _ in _by_halves(everyone, lambda part: settle(starts[part], conditions, stride, threads))]
+    return np.concatenate([everyone[:0], *parts])
+
+
+def _by_halves(which: np.ndarray, walk: Callable[[np.ndarray], Any]) -> Iterator[tuple[np.ndarray, Any]]:
+    """Yield parts of the starts, (n,), with what they return; one that cannot stand or reach its tips is left out."""
     try:
-        settle(starts, conditions, stride, threads)
+        yield which, walk(which)
     except (OutOfReach, SimulationError) as error:
         if isinstance(error, SimulationError) and error.state:
-            raise
-        if len(starts) == 1:
-            return np.array([False])
-        halves = np.array_split(starts, 2)
-        return np.concatenate([_stands(half, conditions, stride, threads) for half in halves])
-    return np.ones(len(starts), dtype=bool)
+            raise  # it diverges
+        for half in np.array_split(which, 2) if len(which) > 1 else ():
+            yield from _by_halves(half, walk)
 
 
-def _within_reach(
-    walks: WalkSettings, which: np.ndarray, threads: int | None
-) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
-    """Yield parts of the starts, (n,), that reach nine of ten tips, with their fates."""
-    try:
-        yield which, _fates(walks.walk(walks.starts[which], threads), threads)
-    except OutOfReach:
-        if len(which) > 1:
-            for half in np.array_split(which, 2):
-                yield from _within_reach(walks, half, threads)
-
-
-def _fates(walk: "PhysicalWalk", threads: int | None) -> dict[str, np.ndarray]:
-    from hexmj.stability import loss_time
-
+def _fates(walks: WalkSettings, which: np.ndarray, threads: int | None) -> dict[str, np.ndarray]:
+    walk = walks.walk(walks.starts[which], threads)
     static = {"static_loss": loss_time(static_plan(walk), threads=threads)}
     return vars(walk.outcomes) | static | {"mechanism": mechanisms(walk), "direction": fall_direction(walk)}
 
@@ -277,77 +255,65 @@ def map_figure(result: "xr.Dataset") -> "Figure":
     rows, columns = result.sizes["value"], result.sizes["velocity"]
     figure = picture(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.62 * (rows + 1))
     physical, saved = figure.subplots(1, 2, sharey=True)
-    numbers = np.concatenate([result.kinematic.values[:1], result.physical.values])
-    words = [[f"{number:.2f}" for number in row] for row in numbers]
+    falls = np.concatenate([result.kinematic.values[:1], result.physical.values])
+    words = [[f"{number:.2f}" for number in row] for row in falls]
     if result.attrs["over"] == "vp":
         for (row, column), number in np.ndenumerate(result.froude.values):
             words[1 + row][column] += f"\nFr {number:.2g}"
-    _heat(physical, numbers, words, "YlOrRd")
     lost = np.isfinite(result.static_loss.values).sum(axis=-1)
     counts = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name").values
-    pairs = zip(counts, lost, strict=True)
-    words = [[f"{a} of {b}" if b else "none lost" for a, b in zip(*row, strict=True)] for row in pairs]
-    planned = np.isfinite(result.planned_loss.isel(value=0).values).sum(axis=-1)
-    words = [[f"{n} lost" for n in planned], *words]
-    _heat(saved, np.concatenate([np.full((1, columns), np.nan), result.saved.values]), words, "YlGn")
-    physical.set_yticks(range(rows + 1), ["kinematic", *(f"{value:g}" for value in result.value.values)])
-    physical.set_ylabel(_label(result))
-    for axes, title in {physical: "physical FLSS", saved: "saved by dynamics, of the static losses"}.items():
+    planned = np.isfinite(result.planned_loss.values[0]).sum(axis=-1)
+    of_lost = [[f"{n} lost" for n in planned]]
+    for row in zip(counts, lost, strict=True):
+        of_lost.append([f"{n} of {total}" if total else "none lost" for n, total in zip(*row, strict=True)])
+    rescued = np.concatenate([np.full((1, columns), np.nan), result.saved.values])
+    for axes, numbers, texts, colours, title in (
+        (physical, falls, words, "YlOrRd", "physical FLSS"),
+        (saved, rescued, of_lost, "YlGn", "saved by dynamics, of the static losses"),
+    ):
+        heat_map(axes, numbers, np.array(texts), cmap=colours, vmin=0.0, vmax=1.0, origin="lower")
+        axes.set_xticks(np.arange(columns - 1) + 0.5, minor=True)
+        axes.set_yticks(np.arange(rows) + 0.5, minor=True)
+        axes.grid(which="minor", color="white", linewidth=2.0)
         axes.axhline(0.5, color="white", linewidth=9.0)
         axes.set_title(title, fontsize=11)
-        axes.set_xticks(range(columns), [f"{v:g}" for v in result.velocity.values])
-        axes.set_xlabel("velocity $V_r / V_p$")
+        velocity_columns(axes, result.velocity.values)
+    physical.set_yticks(range(rows + 1), ["kinematic", *(f"{value:g}" for value in result.value.values)])
+    physical.set_ylabel(_label(result))
     head(figure, "Falls in physics, and starts that dynamics saves", _caption(result))
     return figure
 
 
 def mechanisms_figure(result: "xr.Dataset") -> "Figure":
     """Draw what happened to every start as stacked bars, a panel for each velocity."""
-    result = result.transpose("value", "velocity", "start", ...)
-    columns, total = result.sizes["velocity"], result.sizes["start"]
+    columns, values = result.sizes["velocity"], range(result.sizes["value"])
     figure = picture(max(8.0, 2.6 + 2.3 * columns), 4.6)
-    panels = np.atleast_1d(figure.subplots(1, columns, sharey=True))
-    values = range(result.sizes["value"])
+    panels = figure.subplots(1, columns, sharey=True, squeeze=False)[0]
     for panel, v in zip(panels, result.velocity.values, strict=True):
-        bottom = np.zeros(len(values))
-        for name, colour in COLOURS.items():
-            share = result["count"].sel(velocity=v, mechanism_name=name).values / total
-            style = {"color": colour, "hatch": HATCHES.get(name), "edgecolor": "0.25", "linewidth": 0.0}
+        data, bottom = result.sel(velocity=v), np.zeros(len(values))
+        for name, (colour, hatch) in LOOKS.items():
+            share = data["count"].sel(mechanism_name=name).values / result.sizes["start"]
+            style = {"color": colour, "hatch": hatch, "edgecolor": "0.25", "linewidth": 0.0}
             panel.bar(values, share, 0.82, bottom, label=name.replace("_", " "), **style)
             bottom = bottom + share
-        for measure, style in MARKS.items():
-            above = 1.0 - result[measure].sel(velocity=v).values
-            panel.plot(values, above, marker="_", linestyle="none", **style)
+        for measure, (colour, size) in MARKS.items():
+            style = {"color": colour, "markersize": size, "markeredgewidth": 1.8, "linestyle": "none"}
+            panel.plot(values, 1.0 - data[measure].values, marker="_", **style)
         panel.set_title(f"V = {v:g}", fontsize=11)
         panel.set_xticks(values, [f"{value:g}" for value in result.value.values])
         panel.set(ylim=(0.0, 1.0), xlabel=_label(result).replace(" [", "\n["))
         panel.spines[["top", "right"]].set_visible(False)
     panels[0].set_ylabel("starts\n(above the marks: fell black, toppled white)")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles[::-1], labels[::-1], frameon=False, fontsize=9, loc="outside right center")
+    handles, _ = panels[0].get_legend_handles_labels()
+    figure.legend(handles=handles[::-1], **LEGEND, loc="outside right center")
     head(figure, "What happened to every start", _caption(result))
     return figure
 
 
 def _caption(result: "xr.Dataset") -> str:
     count = result.sizes["start"]
-    left = (
-        f"; {count} of them stand and reach nine of ten tips at every value" if count < result.attrs["starts"] else ""
-    )
-    return caption(result) + left
-
-
-def _heat(axes: "Axes", numbers: np.ndarray, words: list[list[str]], colours: str) -> None:
-    """Draw fractions as colours with words in every cell, the first row at the bottom."""
-    axes.imshow(numbers, cmap=colours, vmin=0.0, vmax=1.0, origin="lower", aspect="auto")
-    for row, column in np.ndindex(numbers.shape):
-        colour = "white" if numbers[row, column] > 0.6 else "0.1"
-        axes.text(column, row, words[row][column], ha="center", va="center", color=colour, fontsize=10, linespacing=1.1)
-    axes.set_xticks(np.arange(numbers.shape[1] - 1) + 0.5, minor=True)
-    axes.set_yticks(np.arange(numbers.shape[0] - 1) + 0.5, minor=True)
-    axes.grid(which="minor", color="white", linewidth=2.0)
-    axes.tick_params(which="both", length=0)
-    axes.spines[:].set_visible(False)
+    fewer = bool(count < result.attrs["starts"])
+    return caption(result) + f"; {count} of them stand and reach nine of ten tips at every value" * fewer
 
 
 def _label(result: "xr.Dataset") -> str:

@@ -1,6 +1,6 @@
 """Standings of the league: frequencies with their intervals, differences, ranks, and the tables of all that."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -36,8 +36,8 @@ ABOUT_TRIALS = (
 Data = Mapping[tuple[str, str], "xr.Dataset"]
 """Result of every cell by entrant and question."""
 
-Rows = Sequence[Sequence["xr.Dataset | None"]]
-"""Results by (row, column); None for a missing cell."""
+Cells = Sequence[Sequence["xr.Dataset | None"]]
+"""Results by (entrant, question); None for a missing cell."""
 
 OVER_VELOCITY = ("entrant", "velocity")
 
@@ -64,39 +64,45 @@ def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Dat
     """
     import xarray as xr
 
-    names, v = list(entrants), velocities.tolist()
+    names = list(entrants)
+
+    def cells(questions: Iterable[str]) -> Cells:
+        return [[data.get((name, question)) for question in questions] for name in names]
+
+    def events(cells: Cells, find: Callable[["xr.Dataset"], "xr.DataArray"]) -> np.ndarray:
+        """Return the events of each start, (entrant, question, start); NaN for a missing cell."""
+        return padded([[[] if cell is None else find(cell) for cell in row] for row in cells])
+
     planned, walked, regimes = (
-        [[data.get((name, f"{kind} {one}")) for one in v] for name in names]
-        for kind in ("kinematic", "physics", "gait")
+        cells([f"{kind} {v}" for v in velocities.tolist()]) for kind in ("kinematic", "physics", "gait")
     )
-    events = {
-        "kinematic": _each(planned, LOST),
-        "measured": _each(walked, lambda cell: happened(cell.measured_loss)),
-        "physical": _each(walked, lambda cell: happened(cell.fall)),
+    upright = [[None if cell is None else _upright(cell) for cell in row] for row in walked]
+    lost = attrgetter("lost")
+    measures = {
+        "kinematic": events(planned, lost),
+        "measured": events(walked, lambda cell: happened(cell.measured_loss)),
+        "physical": events(walked, lambda cell: happened(cell.fall)),
     }
     random = [name for name, entrant in entrants.items() if not entrant.ideal]
     reference = REFERENCE if REFERENCE in random else next(iter(random), "")
     ideal = np.array([entrant.ideal for entrant in entrants.values()])[:, None, None]
-    same = {measure: np.where(ideal, np.nan, values) for measure, values in events.items()}  # the same random starts
+    same = {measure: np.where(ideal, np.nan, values) for measure, values in measures.items()}  # the same random starts
     table: dict[str, Any] = {}
     for measure, values in same.items():
-        table |= frequencies(measure, events[measure], OVER_VELOCITY)
+        table |= frequencies(measure, measures[measure], OVER_VELOCITY)
         table |= differences(f"{measure}_above", values, values[names.index(reference or names[0])], OVER_VELOCITY)
-    for asked in ("range", "accelerated"):
-        table |= frequencies(asked, _each([[data.get((name, asked)) for name in names]], LOST)[0], OVER_VELOCITY[:1])
+    for question in ("range", "accelerated"):
+        table |= frequencies(question, events(cells([question]), lost)[:, 0], OVER_VELOCITY[:1])
     over_trials = "entrant", "trial"
-    tried, lamed = (
-        [[data.get((name, kind + one)) for one in TRIALS] for name in names] for kind in ("", "kinematic, ")
-    )
-    table |= frequencies("fell", _each(tried, _fell), over_trials)
-    table |= frequencies("lost", _each(lamed, LOST), over_trials)
+    table |= frequencies("fell", events(cells(TRIALS), _fell), over_trials)
+    table |= frequencies("lost", events(cells([f"kinematic, {trial}" for trial in TRIALS]), lost), over_trials)
     best, worst = np.array([ranks(values.mean(axis=1)) for values in same.values()]).transpose(1, 2, 0)
     table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
-    table |= {name: _over(walked, find) for name, find in OF_WALKS.items()}
+    table |= {name: _over(upright, find) for name, find in OF_WALKS.items()}
     table["missing"] = _over(walked, lambda cell: cell.fall.isnull().sum())
     table |= {name: _over(regimes, find) for name, find in OF_REGIMES.items()}
     velocity = ("velocity", velocities, VELOCITY)
-    axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(events)}
+    axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(measures)}
     result = xr.Dataset(table, axes, {"reference": reference})
     for name, values in result.items():
         values.attrs["units"] = UNITS.get(str(name), "1")
@@ -120,24 +126,21 @@ def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return best, worst
 
 
-LOST = attrgetter("lost")
-
-
-def _fell(one: "xr.Dataset") -> "xr.DataArray":
-    """Return whether starts fell, from a disturbance or walks from the start on."""
-    return one.fell if "fell" in one else happened(one.fall)
-
-
-def _upright(one: "xr.Dataset") -> "xr.Dataset":
+def _upright(cell: "xr.Dataset") -> "xr.Dataset":
     """Return the walks without a fall."""
-    return one.isel(start=np.isinf(one.fall.values))
+    return cell.isel(start=np.isinf(cell.fall.values))
+
+
+def _fell(cell: "xr.Dataset") -> "xr.DataArray":
+    """Return whether starts fell, from a disturbance or walks from the start on."""
+    return cell.fell if "fell" in cell else happened(cell.fall)
 
 
 OF_WALKS = {
-    "speed": lambda cell: _upright(cell).speed.mean(),
-    "slip": lambda cell: _upright(cell).slip.mean(),
-    "cost": lambda cell: _upright(cell).work.sum() / _upright(cell).way.sum(),
-    "torque": lambda cell: _upright(cell).torque.max() if _upright(cell).start.size else np.nan,
+    "speed": lambda upright: upright.speed.mean(),
+    "slip": lambda upright: upright.slip.mean(),
+    "cost": lambda upright: upright.work.sum() / upright.way.sum(),
+    "torque": lambda upright: upright.torque.max() if upright.start.size else np.nan,
 }
 """Numbers of the walks at one velocity that do not fall; NaN if all fall."""
 
@@ -158,14 +161,9 @@ def _phase(values: "xr.DataArray") -> float:
     return float(circular_mean(known)) if len(known) else np.nan
 
 
-def _over(rows: Rows, find: Callable[["xr.Dataset"], Any]) -> tuple[tuple[str, ...], np.ndarray]:
+def _over(cells: Cells, find: Callable[["xr.Dataset"], Any]) -> tuple[tuple[str, ...], np.ndarray]:
     """Return one number of each cell, (entrant, velocity); NaN for a missing cell."""
-    return OVER_VELOCITY, np.array([[np.nan if cell is None else float(find(cell)) for cell in row] for row in rows])
-
-
-def _each(rows: Rows, find: Callable[["xr.Dataset"], "xr.DataArray"]) -> np.ndarray:
-    """Return the events of each start of each cell, (row, column, start); NaN for a missing cell."""
-    return padded([[[] if cell is None else find(cell) for cell in row] for row in rows])
+    return OVER_VELOCITY, np.array([[np.nan if cell is None else float(find(cell)) for cell in row] for row in cells])
 
 
 LESS, MORE = "-", "+"
@@ -220,29 +218,29 @@ def frequency(one: "xr.Dataset", name: str) -> str:
     return "-" if np.isnan(middle) else f"{_short(middle)} ({_short(low)}-{_short(high)})"
 
 
-def _entrants(shown: "xr.Dataset") -> "list[tuple[str, xr.Dataset]]":
-    return [(name, shown.sel(entrant=name)) for name in shown.entrant.values]
+def _rows(shown: "xr.Dataset", row: Callable[["xr.Dataset"], Iterable[str]]) -> list[tuple[str, ...]]:
+    """Return a row for each entrant, with its name first."""
+    return [(name, *row(shown.sel(entrant=name))) for name in shown.entrant.values]
 
 
 def _ranks(shown: "xr.Dataset") -> Table:
-    rows, controllers = [], settings(shown)["controllers"]
-    for name, one in _entrants(shown):
-        note = f" ({words})" if (words := network_rules(controllers[name])) else ""
-        note += f" (walks missing: {one.missing.sum().item():g})" if one.missing.any() else ""
-        places = [_mean(one[measure]) + place(one.sel(measure=measure)) for measure in MEASURES]
-        rows.append((name + note, *places, frequency(one, "range"), frequency(one, "accelerated")))
+    controllers = settings(shown)["controllers"]
+
+    def row(one: "xr.Dataset") -> Iterable[str]:
+        means = (_known(f"{one[measure].mean(skipna=False).item():.3f}") for measure in MEASURES)
+        places = (mean + place(one.sel(measure=measure)) for measure, mean in zip(MEASURES, means, strict=True))
+        return *places, frequency(one, "range"), frequency(one, "accelerated")
+
+    rows = []
+    for (name, *cells), missing in zip(_rows(shown, row), shown.missing.sum("velocity"), strict=True):
+        rules = f" ({words})" if (words := network_rules(controllers[name])) else ""
+        rows.append((name + rules + _missing(missing), *cells))
     title = "Standings: means over the velocities, and ranks where intervals separate them; = is a tie"
     return Table(title, ("controller", *MEASURES, "J_N, 0.1 to 0.5", "accelerated to 0.9"), rows)
 
 
-def _mean(over_velocities: "xr.DataArray") -> str:
-    """Return the mean of frequencies over velocities; "-" if one is unknown."""
-    return _known(f"{over_velocities.mean(skipna=False).item():.3f}")
-
-
-def _left(one: "xr.Dataset", measure: str) -> str:
-    """Return the number of walks if some are missing."""
-    return f" of {one[f'{measure}_starts'].item()}" if measure != "kinematic" and one.missing.item() else ""
+def _missing(count: "xr.DataArray") -> str:
+    return f" (walks missing: {count.item():g})" if count else ""
 
 
 def place(one: "xr.Dataset") -> str:
@@ -252,52 +250,50 @@ def place(one: "xr.Dataset") -> str:
 
 
 def _over_velocity(shown: "xr.Dataset", measure: str, title: str) -> Table:
-    rows = []
-    for name, one in _entrants(shown):
-        cells = (one.isel(velocity=i) for i in range(shown.sizes["velocity"]))
-        rows.append((name, *(frequency(one, measure) + _left(one, measure) + _against(one, measure) for one in cells)))
+    def cell(one: "xr.Dataset") -> str:
+        fewer = measure != "kinematic" and one.missing.item()
+        below, above = one[f"{measure}_above_high"].item() < 0, one[f"{measure}_above_low"].item() > 0
+        left = f" of {one[f'{measure}_starts'].item()}" if fewer else ""
+        return frequency(one, measure) + left + (f" {LESS}" if below else f" {MORE}" if above else "")
+
+    rows = _rows(shown, lambda one: [cell(one.isel(velocity=i)) for i in range(shown.sizes["velocity"])])
     reference, starts = shown.attrs["reference"], shown[f"{measure}_starts"].max().item()
-    told = f"{title} of {starts_in_words(starts)}"
-    told += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
-    told += f"; {alone}" if (alone := from_one(shown)) else ""
+    title += f" of {starts_in_words(starts)}"
+    title += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
+    title += f"; {alone}" if (alone := from_one(shown)) else ""
     return Table(title, ("controller", *(f"V = {v:g}" for v in shown.velocity.values)), rows)
 
 
-def _against(one: "xr.Dataset", measure: str) -> str:
-    low, high = one[f"{measure}_above_low"].item(), one[f"{measure}_above_high"].item()
-    return f" {LESS}" if high < 0 else f" {MORE}" if low > 0 else ""
-
-
 def _regimes(at: "xr.Dataset") -> Table:
-    rows = []
-    for name, one in _entrants(at):
+    def row(one: "xr.Dataset") -> Iterable[str]:
         shares = (f"{one[key].item():.2f}" for key in ("periodic", "stable"))
         phases = (f"{one[key].round(2).item() % 1.0:.2f}" for key in ("ipsilateral", "contralateral"))
-        regime = *shares, f"{one.reached.item():.0f}", *phases, f"{one.duty_factor.item():.2f}"
-        rows.append((name, *map(_known, regime)))
+        return map(_known, (*shares, f"{one.reached.item():.0f}", *phases, f"{one.duty_factor.item():.2f}"))
+
     head = ("controller", "periodic", "statically stable", "reached after", "ipsilateral", "contralateral", "duty")
-    return Table(
-        f"Steady-state gaits at V = {at.velocity.item():g}: shares, median time, phases, duty factor", head, rows
-    )
+    title = f"Steady-state gaits at V = {at.velocity.item():g}: shares, median time, phases, duty factor"
+    return Table(title, head, _rows(at, row))
 
 
 def _trials(shown: "xr.Dataset") -> Table:
-    rows, most = [], shown.fell_starts.max().item()
-    for name, one in _entrants(shown):
-        falls = (_share(*pair, most) for pair in zip(one.fell.values, one.fell_starts.values, strict=True))
-        rows.append((name, *falls, _known(f"{one.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")))
+    most = shown.fell_starts.max().item()
+
+    def row(one: "xr.Dataset") -> Iterable[str]:
+        for share, starts in zip(one.fell.values, one.fell_starts.values, strict=True):
+            yield _known(f"{share:.2f}") + (f" of {starts}" if 0 < starts < most else "")
+        yield _known(f"{one.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")
+
     v = shown.attrs["trial_velocity"]
     title = f"Falls at V = {v:g} in {starts_in_words(most)}; kinematic: losses, mean of three lost legs. {ABOUT_TRIALS}"
-    return Table(title, ("controller", *shown.trial.values, "kinematic"), rows)
+    return Table(title, ("controller", *shown.trial.values, "kinematic"), _rows(shown, row))
 
 
 def _costs(at: "xr.Dataset") -> Table:
-    rows = []
-    for name, one in _entrants(at):
-        cells = [f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque")]
-        cells.append(f"{one.torque.item() / WEDGED:.2f}")
-        missing = f" (walks missing: {one.missing.item():g})" if one.missing else ""
-        rows.append((name + missing, *map(_known, cells)))
+    def row(one: "xr.Dataset") -> Iterable[str]:
+        costs = (f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque"))
+        return map(_known, (*costs, f"{one.torque.item() / WEDGED:.2f}"))
+
+    rows = [(name + _missing(n), *cells) for (name, *cells), n in zip(_rows(at, row), at.missing, strict=True)]
     head = ("controller", "speed kept", "slip [mm/s]", "cost of transport", "peak torque", "of a cockroach's")
     return Table(f"Walks without a fall at V = {at.velocity.item():g}", head, rows)
 
@@ -306,11 +302,6 @@ def _short(value: float) -> str:
     """Return two digits after the point, three below 0.1, without a leading zero."""
     text = f"{value:.2f}" if value >= 0.1 else f"{value:.3f}".rstrip("0").rstrip(".")
     return text.replace("0.", ".", 1)
-
-
-def _share(value: float, starts: int, most: int) -> str:
-    """Return a share, with the number of starts if it is not that of all."""
-    return _known(f"{value:.2f}") + (f" of {starts}" if 0 < starts < most else "")
 
 
 def _known(text: str) -> str:

@@ -16,6 +16,7 @@ from hexmj.controllers.protocol import Controller
 from hexmj.measures.cells import WalkSettings
 from hexmj.measures.compare import with_flss
 from hexmj.measures.figures import caption
+from hexmj.measures.tables import over_start
 from hexmj.plotting import MEASURE_STYLES, frequency_curve, head, picture, tidy
 from hexmj.stability import loss_time, walk_margin
 from hexmj.studies.base import Study
@@ -57,11 +58,10 @@ LINES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)))
 BESIDE = 1.03
 """Factor of V_p by which the points of several masses stand beside each other."""
 
-GREEN = "#46a35e"
 STYLES: dict[str, dict[str, Any]] = {
-    "measured": {"color": MEASURE_STYLES["measured"]["color"], "marker": "s"},
-    "grounded": {"color": GREEN, "marker": "D"},
-    "physical": {"color": MEASURE_STYLES["physical"]["color"], "marker": "^"},
+    "measured": {"color": "#e08e1b", "marker": "s"},
+    "grounded": {"color": "#46a35e", "marker": "D"},
+    "physical": {"color": "#b3261e", "marker": "^"},
     "centre of pressure": {"color": "0.6", "marker": "v"},
     "measured, same feet stand": {"color": "#6a4c93", "marker": "o"},
     "": {"color": "#1b6ca8", "marker": "o"},
@@ -69,31 +69,27 @@ STYLES: dict[str, dict[str, Any]] = {
 """Name in a legend -> style."""
 
 PANELS = {
-    "agreement": (
-        "starts with the kinematic answer",
-        {"agreement_measured": "measured", "agreement_grounded": "grounded", "agreement": "physical"},
-    ),
-    "margin": (
-        "distance from the planned margin [mm]",
-        {
-            "margin_pressure": "centre of pressure",
-            "margin": "measured",
-            "margin_grounded": "grounded",
-            "margin_same_feet": "measured, same feet stand",
-        },
-    ),
-    "drift": ("centre of mass from O [mm]", {"drift": ""}),
+    "FLSS": {"measured": "measured", "grounded": "grounded", "physical": "physical"},
+    "starts with the kinematic answer": {
+        "agreement_measured": "measured",
+        "agreement_grounded": "grounded",
+        "agreement": "physical",
+    },
+    "distance from the planned margin [mm]": {
+        "margin_pressure": "centre of pressure",
+        "margin": "measured",
+        "margin_grounded": "grounded",
+        "margin_same_feet": "measured, same feet stand",
+    },
+    "centre of mass from O [mm]": {"drift": ""},
 }
-"""Panel -> label of its axis, and its variables with their names in the legend."""
+"""Label of a panel's axis -> its variables with their names in the legend."""
 
-LEGEND: dict[str, Any] = {
+ABOVE: dict[str, Any] = {
     "loc": "lower left",
     "bbox_to_anchor": (0.0, 1.0),
     "frameon": False,
     "fontsize": 8,
-    "handlelength": 1.6,
-    "handletextpad": 0.5,
-    "columnspacing": 1.2,
     "ncols": 2,
 }
 """Places a legend above its panel."""
@@ -172,19 +168,15 @@ class StaticLimit(Study):
 
 def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Dataset":
     """Return the outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start: a cell of the study."""
-    import xarray as xr
-
     from hexmj.measures.support import grounded
 
     walk = walks.walk(walks.starts, threads)
     outcomes = vars(walk.outcomes) | {"grounded_loss": loss_time(grounded(walk), threads=threads)}
-    lost = {name: ("start", outcomes[name], {"units": "time unit"}) for name in LOSSES.values()}
-    away = {}
+    units = dict.fromkeys(LOSSES.values(), "time unit") | REPORTED
+    table = over_start({name: outcomes[name] for name in units}, units)
     for name, values in distances(walk).items():
-        units, long_name = DISTANCES[name]
-        away[name] = ("start", values, {"units": units, "long_name": long_name})
-    reported = {name: ("start", outcomes[name], {"units": unit}) for name, unit in REPORTED.items()}
-    return xr.Dataset(lost | away | reported)
+        table[name] = ("start", values, dict(zip(("units", "long_name"), DISTANCES[name], strict=True)))
+    return table
 
 
 def distances(walk: "PhysicalWalk") -> dict[str, np.ndarray]:
@@ -224,52 +216,40 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
     from matplotlib.lines import Line2D
 
     figure = picture(9.6, 7.6)
-    axes = dict(zip(("flss", *PANELS), figure.subplots(2, 2, sharex=True).ravel(), strict=True))
-    masses = result.leg_mass.values
+    panels, masses, vps = figure.subplots(2, 2, sharex=True).ravel(), result.leg_mass.values, result.vp.values
     lines: dict[float, Any] = dict(zip(masses, LINES * len(masses), strict=False))
     shifts = np.geomspace(1.0 / BESIDE, BESIDE, len(masses)) if len(masses) > 1 else [1.0]
-    for (mass, line), shift in zip(lines.items(), shifts, strict=True):
-        data, first = result.sel(leg_mass=mass).sortby("vp"), mass == masses[0]
-        _frequencies(axes["flss"], data, line, shift, first)
-        for panel, (_, curves) in PANELS.items():
+    _kinematic_band(panels[0], result.isel(leg_mass=0, vp=0))
+    for axes, (title, curves) in zip(panels, PANELS.items(), strict=True):
+        for (mass, line), shift in zip(lines.items(), shifts, strict=True):
+            data = result.sel(leg_mass=mass).sortby("vp")
             for name, label in curves.items():
-                values = data[name] if panel == "agreement" else data[name].mean("start")
-                style = {"markersize": 4.5, "linewidth": 1.6, "label": label if first and label else None}
-                axes[panel].plot(data.vp, values, linestyle=line, **style, **STYLES[label])
-    axes["flss"].set(ylabel="FLSS")
-    for panel, (label, _) in PANELS.items():
-        axes[panel].set(ylabel=label)
-    for panel, ax in axes.items():
-        if panel in ("flss", "agreement"):
-            ax.set(ylim=(-0.02, 1.02))
-        else:
-            ax.update_datalim([(0.0, 0.0)], updatex=False)
-            ax.autoscale_view(scalex=False)
-            ax.set(ylim=(0.0, None), xlabel="$V_p$ [mm/s]; slow walks on the left")
-        _vp_axis(ax, result.vp.values)
+                style = STYLES[label] | {"linestyle": line, "label": label if mass == masses[0] and label else None}
+                if title == "FLSS":
+                    frequency_curve(axes, data.vp * shift, data, name, **style)
+                else:
+                    values = data[name] if "start" not in data[name].dims else data[name].mean("start")
+                    axes.plot(data.vp, values, markersize=4.5, linewidth=1.6, **style)
+        axes.set(ylabel=title, xscale="log")
+        axes.update_datalim([(1.0, 0.0)], updatex=False)
+        axes.autoscale_view(scalex=False)
+        axes.set_ylim((0.0, None) if "[mm]" in title else (-0.02, 1.02))
+        axes.set_xticks(vps, [f"{vp:g}" for vp in vps])
+        axes.minorticks_off()
+        axes.set_xlim(0.85 * vps.min(), vps.max() / 0.85)
+        tidy(axes)
+    for axes in panels[:3]:
+        axes.legend(**ABOVE)
+    for axes in panels[2:]:
+        axes.set_xlabel("$V_p$ [mm/s]; slow walks on the left")
     handles = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
-    axes["drift"].legend(handles=handles, **LEGEND)
+    panels[3].legend(handles=handles, **ABOVE)
     head(figure, f"As $V_p$ goes to zero, V = {result.attrs['velocity']:g}, with 95 % intervals", caption(result))
     return figure
 
 
-def _frequencies(axes: "Axes", data: "xr.Dataset", line: Any, shift: float, first: bool) -> None:
-    """Draw the FLSS at one mass of the legs; the kinematic one, a band, depends on neither mass nor V_p."""
-    if first:
-        low, middle, high = (data[f"kinematic{end}"].values[0] for end in ("_low", "", "_high"))
-        colour = MEASURE_STYLES["kinematic"]["color"]
-        axes.axhspan(low, high, color=colour, alpha=0.15, linewidth=0)
-        axes.axhline(middle, color=colour, linewidth=1.6, label="kinematic")
-    for measure in ("measured", "grounded", "physical"):
-        label = measure if first else None
-        frequency_curve(axes, data.vp * shift, data, measure, label=label, linestyle=line, **STYLES[measure])
-
-
-def _vp_axis(axes: "Axes", vps: np.ndarray) -> None:
-    axes.set_xscale("log")
-    axes.set_xticks(vps, [f"{vp:g}" for vp in vps])
-    axes.minorticks_off()
-    axes.set_xlim(0.85 * vps.min(), vps.max() / 0.85)
-    tidy(axes)
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(**LEGEND)
+def _kinematic_band(axes: "Axes", data: "xr.Dataset") -> None:
+    """Draw the kinematic FLSS and its interval, which depend on neither mass nor V_p."""
+    style = {"color": MEASURE_STYLES["kinematic"]["color"]}
+    axes.axhspan(data.kinematic_low.item(), data.kinematic_high.item(), alpha=0.15, linewidth=0, **style)
+    axes.axhline(data.kinematic.item(), linewidth=1.6, label="kinematic", **style)

@@ -6,7 +6,7 @@ distance takes the hindmost foot one stride beyond the longest obstacle.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.measures.cells import outcome_table
 from hexmj.measures.figures import caption_of_at_least
 from hexmj.measures.tables import VELOCITY, reach
-from hexmj.plotting import frequency_curve, head, picture, tidy
+from hexmj.plotting import LEGEND, SERIES, frequency_curve, head, picture, tidy
 from hexmj.starts import checked_list
 from hexmj.stats import wilson_intervals
 from hexmj.studies.base import Study
@@ -26,7 +26,6 @@ from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 ObstacleKind = Literal["step", "gap", "hurdle", "rough"]
@@ -50,18 +49,6 @@ SIZES = {
     "rough": "highest bump [mm]",
 }
 """Kind of ground -> label of its axis."""
-
-FLAT = "flat"
-"""Ground that stands in every column of the figure."""
-
-STYLES: tuple[dict[str, Any], ...] = (
-    {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
-    {"color": "#2a9d5c", "marker": "s", "linestyle": "--"},
-    {"color": "#e08e1b", "marker": "^", "linestyle": "-."},
-    {"color": "#b3261e", "marker": "D", "linestyle": ":"},
-    {"color": "#6a4c93", "marker": "v", "linestyle": "-"},
-)
-"""Styles of the velocities in turn."""
 
 
 @dataclass(frozen=True)
@@ -203,29 +190,23 @@ def with_crossings(data: "xr.Dataset", distance: float, stride: Stride, begin: f
 
 def terrain_figure(result: "xr.Dataset") -> "Figure":
     """Draw a column for each kind of ground and a row for each grasp; flat ground is at 0 mm."""
-    kinds, grasps = list(dict.fromkeys(result.ground.values[result.ground.values != FLAT])), result.grasp.values
+    ground, grasps, speeds = result.ground.values, result.grasp.values, result.velocity.values
+    kinds = list(dict.fromkeys(ground[ground != "flat"]))
     figure = picture(max(4.8, 1.0 + 2.8 * len(kinds)), 1.3 + 2.6 * len(grasps))
     panels = figure.subplots(len(grasps), len(kinds), sharey=True, sharex="col", squeeze=False)
-    for row, grasp in zip(panels, grasps, strict=True):
-        for axes, kind in zip(row, kinds, strict=True):
-            chosen = np.isin(result.ground.values, (FLAT, kind))
-            _curves(axes, result.sel(grasp=grasp).isel(obstacle=np.flatnonzero(chosen)).sortby("size"))
-        row[0].set_ylabel(f"FLSS, grasp {grasp:g}")
-    for axes, kind in zip(panels[-1], kinds, strict=True):
-        axes.set_xlabel(SIZES[kind])
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=min(5, len(labels)))
+    for (row, column), axes in np.ndenumerate(panels):
+        chosen = np.flatnonzero(np.isin(ground, ("flat", kinds[column])))
+        data = result.sel(grasp=grasps[row]).isel(obstacle=chosen).sortby("size")
+        sizes = data["size"].values
+        shifts = (np.arange(len(speeds)) - (len(speeds) - 1) / 2) * 0.02 * sizes.max()
+        for v, style, shift in zip(speeds, SERIES * len(speeds), shifts, strict=False):
+            frequency_curve(axes, sizes + shift, data.sel(velocity=v), "flss", label=f"V = {v:g}", **style)
+        axes.set(ylim=(-0.02, 1.02), xlabel=SIZES[kinds[column]], ylabel=f"FLSS, grasp {grasps[row]:g}")
+        axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
+        axes.label_outer()
+        tidy(axes)
+    handles, _ = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=min(5, len(handles)))
     title = "Falls once the obstacle has been reached, with 95 % intervals"
     head(figure, title, caption_of_at_least(int(result.reached.min()), result))
     return figure
-
-
-def _curves(axes: "Axes", data: "xr.Dataset") -> None:
-    """Draw FLSS against size, (obstacle, velocity), with its intervals side by side."""
-    sizes, count = data["size"].values, data.sizes["velocity"]
-    shifts = (np.arange(count) - (count - 1) / 2) * 0.02 * sizes.max()
-    for v, style, shift in zip(data.velocity.values, STYLES * count, shifts, strict=False):
-        frequency_curve(axes, sizes + shift, data.sel(velocity=v), "flss", label=f"V = {v:g}", **style)
-    axes.set(ylim=(-0.02, 1.02))
-    axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
-    tidy(axes)
