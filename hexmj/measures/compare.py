@@ -10,7 +10,6 @@ import numpy as np
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import check_velocities
 from hexmj.controllers.protocol import Controller, settings_of
-from hexmj.errors import InputError
 from hexmj.io import attributes
 from hexmj.legs import LEGS
 from hexmj.measures.cells import WalkSettings, outcome_table
@@ -26,6 +25,7 @@ from hexmj.measures.tables import (
 from hexmj.starts import check_draw, draw_starts
 from hexmj.sweep import Cell, Execution, over_axes, run_study
 from hexmj.timing import Acceleration, Stride
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,8 +63,7 @@ class Comparison:
     """The accelerating procedure of Eq. 11."""
 
     def __post_init__(self) -> None:
-        if not self.controllers:
-            raise InputError("controllers = {}; expected at least one controller")
+        distinct("controllers", list(self.controllers))
         for controller in self.controllers.values():
             settings_of(controller)  # raises before the work, not after it
         check_draw(self.n_starts, self.seed)
@@ -98,11 +97,9 @@ class Comparison:
         )
         table.fall_part.attrs["flag_meanings"] = " ".join(self.conditions.body.trunk)
         lost, fell = table.planned_loss < np.inf, table.fall < np.inf
-        cases = dict(zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True))
-        count = {"units": "1", "long_name": "number of starts"}
-        table = with_flss(table, MEASURES | BESIDE).assign(
-            {name: case.sum("start").assign_attrs(count) for name, case in cases.items()}
-        )
+        table = with_flss(table, MEASURES | BESIDE)
+        for name, case in zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True):
+            table[name] = case.sum("start").assign_attrs(units="1", long_name="number of starts")
         walks = self.observation_time, self.n_starts, self.seed, self.stride, self.acceleration
         made = {"study": "compare"} | settings(self.controllers, *walks) | {"conditions": self.conditions.settings()}
         return table.assign_attrs(attributes(made))
@@ -126,12 +123,7 @@ def compare(
     Args:
         controllers: one, or several by name.
         velocities: V_r, one or several (final ones when accelerating), each 0 <= V < 1.
-        n_starts: number of starts.
-        observation_time: 'walk', 'start' or a number [time units].
-        seed: of the starts.
-        conditions: of the physical walks.
-        stride: step range, lines of the tips and time step.
-        acceleration: the accelerating procedure of Eq. 11.
+        n_starts, observation_time, seed, conditions, stride, acceleration: fields of `Comparison`.
         folder: caches what is finished; None caches nothing.
         how: executor, threads and progress, see `sweep.Execution`; the result does not depend on it.
 

@@ -1,7 +1,7 @@
 """The kinematic measure: planned walks, their first losses, and FLSS, the frequency of these (paper, Section 3)."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -120,22 +120,23 @@ class KinematicFlss:
         return observed(self.velocities, self.observation_time, self.stride, self.acceleration)
 
     @property
-    def places(self) -> list[tuple[int, int]]:
+    def places(self) -> Iterator[tuple[int, int]]:
         """Index of the velocity and first start of each cell."""
-        return list(product(range(len(self.velocities)), range(0, self.n_starts, self.range_of)))
+        return product(range(len(self.velocities)), range(0, self.n_starts, self.range_of))
 
     def cells(self) -> list[Cell]:
         """Return the cells, each a `losses_of_range`."""
         v, duration = self.observed
         check_velocities(self.controller, self.velocities, self.stride, self.acceleration)
         same = {name: getattr(self, name) for name in ("controller", "seed", "stride", "acceleration")}
-        cells = []
-        for i, first in self.places:
+
+        def cell(i: int, first: int) -> Cell:
             count = min(self.range_of, self.n_starts - first)
             own = {"velocity": v[i], "duration": duration[i], "first": first, "n_starts": count}
             name = f"{self.controller.name}-V-{v[i]:g}-from-{first}"
-            cells.append(Cell(name, losses_of_range, same | own, work=duration[i] * count))
-        return cells
+            return Cell(name, losses_of_range, same | own, work=duration[i] * count)
+
+        return [cell(*place) for place in self.places]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the table of `flss`."""
@@ -161,9 +162,7 @@ def losses_of_range(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> "xr.Dataset":
-    """Count the starts from `first` on that lose static stability.
-
-    Starts are drawn, walked and counted in slabs.
+    """Count the starts from `first` on that lose static stability, a slab at a time.
 
     Returns:
         `losses`, (sample,), in the stream's samples of 1000 starts; the range may begin and end within a sample.
@@ -200,11 +199,7 @@ def flss(
     Args:
         controller: plans the walks.
         velocities: V_r, one or several (final ones when accelerating), each 0 <= V < 1.
-        n_starts: N.
-        observation_time: 'walk', 'start' or a number [time units].
-        seed: of the starts.
-        stride: step range, lines of the tips and time step.
-        acceleration: the accelerating procedure of Eq. 11.
+        n_starts, observation_time, seed, stride, acceleration: fields of `KinematicFlss`.
         range_of: starts that are computed and cached together; the result does not depend on it.
         folder: caches what is finished; None caches nothing.
         how: executor, threads and progress, see `sweep.Execution`; the result does not depend on it.
@@ -238,10 +233,7 @@ def flss_over_range(
         controller: plans the walks.
         low: least velocity of the uniform range W, 0 <= V < 1, and above 0 with the observation time 'walk'.
         high: greatest velocity of the range.
-        n_starts: N.
-        observation_time: 'walk', 'start' or a number [time units]; the named ones depend on each velocity.
-        seed: of the starts and their velocities.
-        stride: step range, lines of the tips and time step.
+        n_starts, observation_time, seed, stride: as of `flss`; a named observation time depends on each velocity.
         threads: by default one per core; the result does not depend on it.
 
     Returns:

@@ -13,7 +13,7 @@ from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, WalkSoFar
 from hexmj.physics.pushes import Push
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, settle
-from hexmj.progress import Progress, progress_bar
+from hexmj.progress import Progress, shown
 from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.walks import PlannedWalk, Walk, copied, extent, footfall_html, joined, part_of
 
@@ -86,17 +86,12 @@ def physical_walk(
     """
     stride, conditions = stride or Stride(), conditions or Conditions()
     check_ground(conditions)
-    if progress is True:
-        with progress_bar("walking") as report:
-            return physical_walk(
-                starts, controller, velocity, duration, conditions=conditions, stride=stride,
-                acceleration=acceleration, threads=threads, progress=report,
-            )  # fmt: skip
     kinematic = begin(controller, starts, velocity, stride, acceleration, threads)
     planned = advanced(kinematic, int(steps_within(duration, stride)))
     settled = settle(starts, conditions, stride, threads)
     plan = begin(controller, settled.starts, velocity, stride, acceleration, threads=1)
-    return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=progress or None)
+    with shown(progress, "walking") as advance:
+        return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=advance)
 
 
 def physical_walk_of_plan(
@@ -153,13 +148,7 @@ def physical_outcomes(
     The planned loss is always the kinematic one, without feedback: the same measure with and without it.
 
     Args:
-        settled: starts at rest, see `settle.settle`.
-        controller: as for `physical_walk`, and so are the other arguments.
-        velocity: V_r, or its final value; one number or (start,).
-        duration: observation time [time units].
-        acceleration: the accelerating procedure of Eq. 11.
-        threads: one per core unless given.
-        progress: called with the fraction done since the last call.
+        settled: starts at rest, see `settle.settle`; the other arguments are those of `physical_walk`.
 
     Raises:
         InputError, SimulationError: see `rollout.drive`.

@@ -14,6 +14,7 @@ from hexmj.measures.tables import VELOCITY
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import kept_gaits, main_peak
 from hexmj.phases import PAIRS, circular_mean, wilson_phase
+from hexmj.plotting import picture
 from hexmj.timing import OBSERVATION_TIMES
 from hexmj.walks import spans
 
@@ -82,7 +83,7 @@ def phase_figure(measured: Measurements, model: str) -> "tuple[Figure, xr.Datase
         {"phase": ((*dims, "gait"), phase, {"units": "1"}), "main_peak": (dims, peak, {"units": "1"})},
         {"velocity": ("velocity", v, VELOCITY), "leg": list(RELATIVE)},
     )
-    figure = _figure(6.4, 4.6)
+    figure = picture(6.4, 4.6)
     axes = figure.subplots()
     for row, (leg, marker) in enumerate(RELATIVE.items()):
         axes.plot(np.repeat(v, phase.shape[2]), phase[row].ravel(), ".", color=colour, markersize=4, alpha=0.25,
@@ -106,7 +107,7 @@ def phase_histograms(measured: Measurements, model: str) -> "tuple[Figure, xr.Da
     kept = [kept[i] for i in np.unique(np.linspace(0, len(kept) - 1, 5).round().astype(int))]
     edges = np.linspace(0, 1, BINS + 1)
     counts = np.array([[np.histogram(one.phase.sel(pair=pair), edges)[0] for pair in PAIRS] for _, one in kept])
-    figure = _figure(8.6, 7.4)
+    figure = picture(8.6, 7.4)
     panels = figure.subplots(len(PAIRS), len(kept), sharex=True, sharey="row", squeeze=False)
     for row, pair in enumerate(PAIRS):
         for column, (v, one) in enumerate(kept):
@@ -133,15 +134,14 @@ def phase_histograms(measured: Measurements, model: str) -> "tuple[Figure, xr.Da
 def footfall_diagrams(measured: Measurements, model: str) -> "tuple[Figure, xr.Dataset]":
     """Draw which legs protract (bars) in the steady-state gait, over three periods of a single leg."""
     data = measured[f"{model} footfall"]
-    figure = _figure(7.2, 1.35 * data.sizes["velocity"] + 0.5)
+    figure = picture(7.2, 1.35 * data.sizes["velocity"] + 0.5)
     panels = figure.subplots(data.sizes["velocity"], 1, sharex=True, squeeze=False)[:, 0]
     time = data.time.values
     for axes, v in zip(panels, data.velocity.values, strict=True):
         stance = data.stance.sel(velocity=v).values.astype(bool)
         for row in range(len(LEGS)):
-            axes.broken_barh(
-                spans(time, ~stance[:, row]), (row - 0.36, 0.72), color=MODELS[model] if row < 3 else "0.2"
-            )
+            colour = MODELS[model] if row < 3 else "0.2"
+            axes.broken_barh(spans(time, ~stance[:, row]), (row - 0.36, 0.72), color=colour)
         axes.set(ylim=(5.6, -0.6), xlim=(time[0], time[-1]), yticks=range(len(LEGS)), yticklabels=LEGS)
         axes.tick_params(axis="y", length=0, labelsize=8)
         axes.axhline(2.5, color="0.8", linewidth=0.8)
@@ -154,7 +154,7 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
     """Draw FLSS against velocity (Figs. 2-4): means of the samples of starts, bars of one standard deviation."""
     import xarray as xr
 
-    figure, curves = _figure(6.4, 4.6), CURVES[number]
+    figure, curves = picture(6.4, 4.6), CURVES[number]
     axes = figure.subplots()
     data = xr.concat(
         [_samples(measured[name].lost.sel(observation_time=observation_time)) for name in curves],
@@ -184,20 +184,9 @@ def _samples(lost: "xr.DataArray") -> "xr.Dataset":
     means = lost.values.reshape(lost.sizes["velocity"], SAMPLES, -1).mean(axis=2)
     means[~known] = np.nan
     size = lost.sizes["start"] // SAMPLES
-    return xr.Dataset(
-        {
-            "flss": ("velocity", means.mean(axis=1), {"units": "1"}),
-            "sample_sd": ("velocity", means.std(axis=1, ddof=1), {"units": "1"}),
-        },
-        {"velocity": lost.velocity},
-        {"samples": f"{SAMPLES} of {size} starts"},
-    )
-
-
-def _figure(width: float, height: float) -> "Figure":
-    from hexmj.plotting import picture
-
-    return picture(width, height)
+    columns = {"flss": means.mean(axis=1), "sample_sd": means.std(axis=1, ddof=1)}
+    table = {name: ("velocity", values, {"units": "1"}) for name, values in columns.items()}
+    return xr.Dataset(table, {"velocity": lost.velocity}, {"samples": f"{SAMPLES} of {size} starts"})
 
 
 Draw = Callable[[Measurements], "tuple[Figure, xr.Dataset]"]

@@ -1,6 +1,8 @@
 """Measurements at one velocity: losses of stability, steady-state gaits and footfalls; losses after obstacles.
 
 The outcome of every start is kept, so that curves can be compared on the same starts, and samples of 1000 formed later.
+Arguments have the same meaning in all functions: the velocity V_r as a fraction of V_p, the number and the seed of the
+starts, the stride, the procedure of Eq. 11, and threads, by default one per core.
 """
 
 from dataclasses import replace
@@ -45,20 +47,14 @@ def losses(
     seed: int,
     stride: Stride,
     acceleration: Acceleration | None,
-    late: bool,
+    late: bool = False,
     threads: int | None = None,
 ) -> "xr.Dataset":
     """Return which starts lose static stability, (observation time, start): 1 lost, 0 not, `NO_SET` without a set.
 
     Args:
-        velocity: V_r, a fraction of V_p.
         sets: the network for each of `OBSERVATION_TIMES`.
-        n_starts: number of starts.
-        seed: of the starts.
-        stride: step range and time step.
-        acceleration: Eq. 11.
         late: count only losses after `LATE_PERIODS`.
-        threads: one per core by default.
     """
     starts = draw_starts(n_starts, seed, stride)
     lost = np.full((len(OBSERVATION_TIMES), n_starts), NO_SET, dtype=np.int8)
@@ -96,12 +92,8 @@ def lost_after(
 
     Args:
         starts: (start, leg) tips at time 0 [mm].
-        controller: the network.
-        velocity: V_r, a fraction of V_p.
         wait: time at the beginning that does not count, at least one step [time units].
         durations: observation times after it, (duration,) [time units].
-        stride: step range and time step.
-        threads: one per core by default.
 
     Returns:
         (duration, start)
@@ -187,14 +179,10 @@ def losses_after(
     in mid-stride. The observation time begins when the walk is at its velocity again.
 
     Args:
-        velocity: V_r, a fraction of V_p.
         controller: a controller whose plans can be steered.
         answer: to the obstacle.
         n_starts: starts that reach it: the first of the seed's that are stable until then.
-        seed: of the starts and of the times of the obstacle.
-        stride: step range and time step.
         acceleration: Eq. 11 for the answer 'slow down'; None for others.
-        threads: one per core by default.
 
     Raises:
         InputError: too few starts are stable so long, or none reaches a stable gait with postures.

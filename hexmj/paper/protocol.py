@@ -1,12 +1,13 @@
 """What Section 5 simulates: measurements, each of a few seconds at one velocity, from which the claims are judged."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from hexmj.controllers.cruse1998 import MODEL_VARIANTS, PRESETS, Cruse1998, ModelVariant, Order
 from hexmj.paper.found_sets import found_set
-from hexmj.paper.measurements import Answer, footfalls, limit_regimes, losses, losses_after
+from hexmj.paper.measurements import footfalls, limit_regimes, losses, losses_after
 from hexmj.starts import MOST_STARTS, SAMPLE, checked_list
 from hexmj.sweep import Cell
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
@@ -118,86 +119,47 @@ class Measurement:
     """A function of one velocity, and where it is measured."""
 
     function: Callable[..., Any]
+    """`losses` (Figs. 2-4), `limit_regimes` (Figs. 5 and 6), `footfalls`, or `losses_after` (Section 6)."""
     at: str
     """Field of a protocol that holds the velocities."""
-    settings: Callable[[float, Protocol], dict[str, Any]]
-    """Arguments of the function besides velocity and seed, from a velocity and a protocol."""
+    preset: str
+    """Name of the network, see `Protocol.network`."""
     seconds: float = 1.0
     """Time on two cores, for the progress bar [s]."""
+    accelerated: bool = False
+    """With Eq. 11."""
+    own: Mapping[str, Any] = field(default_factory=dict)
+    """Further arguments of the function."""
+
+    def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
+        """Return the arguments of the function."""
+        networks = [protocol.network(self.preset, time, velocity) for time in OBSERVATION_TIMES]
+        planned: dict[str, Any] = {"sets": tuple(networks)} if self.function is losses else {"controller": networks[0]}
+        starts: dict[Any, int] = {losses: protocol.samples * protocol.sample, limit_regimes: protocol.gait_starts}
+        starts |= {losses_after: protocol.obstacle_starts}
+        planned |= {"n_starts": starts[self.function]} if self.function in starts else {}
+        stride = protocol.gait_stride if self.at == "gait_velocities" else protocol.stride
+        procedure = protocol.acceleration if self.accelerated else None
+        walks = {"velocity": velocity, "seed": protocol.seed, "stride": stride, "acceleration": procedure}
+        return walks | planned | dict(self.own)
 
 
-def _losses(preset: str, seconds: float = 1.0, *, accelerated: bool = False, late: bool = False) -> Measurement:
-    """Return the losses under both observation times: Figs. 2-4."""
-
-    def settings(velocity: float, protocol: Protocol) -> dict[str, Any]:
-        return {
-            "sets": tuple(protocol.network(preset, time, velocity) for time in OBSERVATION_TIMES),
-            "n_starts": protocol.samples * protocol.sample,
-            "stride": protocol.stride,
-            "acceleration": protocol.acceleration if accelerated else None,
-            "late": late,
-        }
-
-    return Measurement(losses, "velocities", settings, seconds)
-
-
-def _gaits(preset: str, seconds: float, *, accelerated: bool = True) -> Measurement:
-    """Return the steady-state gaits: Figs. 5 and 6 with Eq. 11, or without it as in Section 5.2."""
-
-    def settings(velocity: float, protocol: Protocol) -> dict[str, Any]:
-        return {
-            "controller": protocol.network(preset, "walk", velocity),
-            "n_starts": protocol.gait_starts,
-            "stride": protocol.gait_stride if accelerated else protocol.stride,
-            "acceleration": protocol.acceleration if accelerated else None,
-        }
-
-    return Measurement(limit_regimes, "gait_velocities" if accelerated else "velocities", settings, seconds)
-
-
-def _footfalls(preset: str) -> Measurement:
-    """Return the stances in the accelerated walk of one start."""
-
-    def settings(velocity: float, protocol: Protocol) -> dict[str, Any]:
-        network = protocol.network(preset, "walk", velocity)
-        return {"controller": network, "stride": protocol.stride, "acceleration": protocol.acceleration}
-
-    return Measurement(footfalls, "footfall_velocities", settings)
-
-
-def _obstacles(preset: str, answer: Answer, seconds: float = 1.0) -> Measurement:
-    """Return the losses after an obstacle in mid-stride (Section 6)."""
-
-    def settings(velocity: float, protocol: Protocol) -> dict[str, Any]:
-        return {
-            "controller": protocol.network(preset, "walk", velocity),
-            "answer": answer,
-            "n_starts": protocol.obstacle_starts,
-            "stride": protocol.stride,
-            "acceleration": protocol.acceleration if answer == "slow down" else None,
-        }
-
-    return Measurement(losses_after, "obstacle_velocities", settings, seconds)
-
+_losses = partial(Measurement, losses, "velocities")
+_gaits = partial(Measurement, limit_regimes, "gait_velocities", accelerated=True)
+_footfalls = partial(Measurement, footfalls, "footfall_velocities", accelerated=True)
+_obstacles = partial(Measurement, losses_after, "obstacle_velocities", "ldvs")
 
 MEASUREMENTS: dict[str, Measurement] = {
     **{name: _losses(name) for name in ("uncoordinated", "hws", "ldvs", "ideal", *RANGES, "own")},
-    "hws late": _losses("hws", 5.0, late=True),
-    "ldvs late": _losses("ldvs", 5.0, late=True),
-    "ideal late": _losses("ideal", 5.0, late=True),
-    "own late": _losses("own", 3.0, late=True),
-    "hws accelerated": _losses("hws", 25.0, accelerated=True),
-    "ldvs accelerated": _losses("ldvs", 25.0, accelerated=True),
-    "hws regimes": _gaits("hws", 7.0, accelerated=False),
-    "ldvs regimes": _gaits("ldvs", 7.0, accelerated=False),
-    "hws gaits": _gaits("hws", 80.0),
-    "ldvs gaits": _gaits("ldvs", 80.0),
-    "hws footfall": _footfalls("hws"),
-    "ldvs footfall": _footfalls("ldvs"),
-    "ldvs halted": _obstacles("ldvs", "none"),
-    "ldvs halted, positions": _obstacles("ldvs", "positions", 4.0),
-    "ldvs halted, postures": _obstacles("ldvs", "postures", 4.0),
-    "ldvs halted, slows down": _obstacles("ldvs", "slow down", 12.0),
+    **{f"{name} late": _losses(name, 5.0, own={"late": True}) for name in ("hws", "ldvs", "ideal", "own")},
+    **{f"{name} accelerated": _losses(name, 25.0, accelerated=True) for name in ("hws", "ldvs")},
+    **{f"{name} regimes": Measurement(limit_regimes, "velocities", name, 7.0) for name in ("hws", "ldvs")},
+    **{f"{name} gaits": _gaits(name, 80.0) for name in ("hws", "ldvs")},
+    **{f"{name} footfall": _footfalls(name) for name in ("hws", "ldvs")},
+    "ldvs halted": _obstacles(own={"answer": "none"}),
+    "ldvs halted, positions": _obstacles(4.0, own={"answer": "positions"}),
+    "ldvs halted, postures": _obstacles(4.0, own={"answer": "postures"}),
+    "ldvs halted, slows down": _obstacles(12.0, accelerated=True, own={"answer": "slow down"}),
 }
 """All measurements by name."""
 
@@ -211,9 +173,4 @@ def cells(name: str, protocol: Protocol) -> dict[float, Cell]:
     measurement = MEASUREMENTS[choice("measurement", name, MEASUREMENTS)]
     velocities: tuple[float, ...] = getattr(protocol, measurement.at)
     work = measurement.seconds / len(velocities)
-
-    def cell(v: float) -> Cell:
-        settings = {"velocity": v, "seed": protocol.seed} | measurement.settings(v, protocol)
-        return Cell(f"{name} {v:g}", measurement.function, settings, work)
-
-    return {v: cell(v) for v in velocities}
+    return {v: Cell(f"{name} {v:g}", measurement.function, measurement.settings(v, protocol), work) for v in velocities}

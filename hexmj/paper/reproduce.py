@@ -59,10 +59,6 @@ class Row:
         """The known reason, if we differ."""
         return self.claim.why if "differs" in map(verdict, self.answers.values()) else ""
 
-    def under(self, name: str) -> "Row":
-        """Return the row with the answers under another model variant."""
-        return Row(self.claim, self.beside[name])
-
 
 def verdict(answer: Answer | None) -> str:
     """Return 'agrees', 'differs' or that a set has not been searched yet."""
@@ -82,14 +78,13 @@ class Report:
         """Names of the other model variants."""
         return list(self.rows[0].beside)
 
-    def tables(self) -> list[tuple[Sequence[str], Sequence[Sequence[str]]]]:
+    def tables(self) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
         """Return the heads and rows of a table of our answers, and of one for each other model variant."""
-        tables: list[tuple[Sequence[str], Sequence[Sequence[str]]]]
-        tables = [(_heads(), [_cells(replace(row, beside={})) for row in self.rows])]
+        heads = _heads()
+        tables = [(heads, [_cells(replace(row, beside={})) for row in self.rows])]
         for name in self.variants:
-            heads = "section", "the paper", "its value", *(f"{name}, {time}" for time in OBSERVATION_TIMES)
             rows = [(*_paper(row), *_answered(row.beside[name])) for row in self.rows]
-            tables.append((heads, rows))
+            tables.append(((*heads[:3], *(f"{name}, {time}" for time in OBSERVATION_TIMES)), rows))
         return tables
 
     @cached_property
@@ -99,13 +94,13 @@ class Report:
 
     @property
     def _searched(self) -> list[str]:
-        seed = self.protocol.seed
-        warning = f"seed {seed}: ideal sets were searched on these starts, where they look better than they are"
-        return [warning] if seed in {one.seed for one in found_sets()} else []
+        if (seed := self.protocol.seed) not in {one.seed for one in found_sets()}:
+            return []
+        return [f"seed {seed}: ideal sets were searched on these starts, where they look better than they are"]
 
     @property
     def _beside(self) -> list[str]:
-        counts = {name: summary([row.under(name) for row in self.rows]) for name in self.variants}
+        counts = {name: summary([Row(row.claim, row.beside[name]) for row in self.rows]) for name in self.variants}
         return [f"model variant {name}, {line}" for name, lines in counts.items() for line in lines]
 
     def markdown(self) -> str:
@@ -257,15 +252,16 @@ def _paper(row: Row) -> tuple[str, str, str]:
 
 def _answered(answers: Mapping[str, Answer | None]) -> list[str]:
     """Return verdict and number under each observation time."""
-    cells = [verdict(answer) + (f": {_number(answer)}" if answer else "") for answer in answers.values()]
+
+    def cell(answer: Answer | None) -> str:
+        if answer is None:
+            return NOT_SEARCHED
+        interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
+        number = "no value" if answer.value != answer.value else f"{answer.value:.4f}{interval}"
+        return f"{verdict(answer)}: {number} at {answer.where}"
+
+    cells = [cell(answer) for answer in answers.values()]
     return cells + [SAME] * (len(OBSERVATION_TIMES) - len(cells))
-
-
-def _number(answer: Answer) -> str:
-    if answer.value != answer.value:
-        return f"no value at {answer.where}"
-    interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
-    return f"{answer.value:.4f}{interval} at {answer.where}"
 
 
 def _plain(answers: Mapping[str, Answer | None]) -> dict[str, dict[str, Any]]:
