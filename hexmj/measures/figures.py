@@ -1,7 +1,8 @@
 """Captions of results, and the figures of FLSS against velocity."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, fields
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,14 +35,29 @@ COLUMNS = 3
 
 
 def caption(result: "xr.Dataset") -> str:
-    """Return a line for a figure's title: controllers, starts, observation time, V_p, and other settings."""
+    """Return a line for a figure's title: controllers, starts, observation time, V_p, and other settings.
+
+    Fields of the stride and conditions appear if they are not defaults.
+    """
     made = settings(result)
-    axis = next((result[name].values for name in ("controller", "entrant") if name in result.coords), None)
-    names = None if axis is None else np.ravel(axis).tolist()
-    physical = conditions_in_words(made) if made.get("physical", True) else ""
-    return "; ".join(
-        filter(None, [_controllers(made, names), *_walks(made), _stride(made.get("stride") or {}), physical])
-    )
+    words = [_controllers(made.get("controllers", {}), result)]
+    if "starts" in made:
+        words.append(starts_in_words(made["starts"]))
+    if (time := made.get("observation_time")) is not None:
+        words.append(f"observation time {f'of {time:g} time units' if isinstance(time, float) else time}")
+    if "seed" in made:
+        words.append(f"seed {made['seed']}")
+    if acceleration := made.get("acceleration"):
+        words.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
+    usual = json.loads(json.dumps(asdict(Stride())))
+    changed = {name: value for name, value in (made.get("stride") or {}).items() if value != usual.get(name, value)}
+    lines = ["other lines of the tips"] if changed.pop("geometry", None) else []
+    words.append(", ".join([*(_term(name, value) for name, value in changed.items()), *lines]))
+    if made.get("physical", True):
+        given = made.get("conditions") or {}
+        shown = {"vp", *unusual(given)}
+        words.append(", ".join(_term(name, value) for name, value in given.items() if name in shown))
+    return "; ".join(filter(None, words))
 
 
 def caption_of_at_least(least: int, result: "xr.Dataset") -> str:
@@ -53,13 +69,6 @@ def caption_of_at_least(least: int, result: "xr.Dataset") -> str:
 def starts_in_words(number: int) -> str:
     """Return a number of starts as a text."""
     return "1 start" if number == 1 else f"{number} starts"
-
-
-def conditions_in_words(made: Mapping[str, Any]) -> str:
-    """Return V_p and the conditions that are not defaults, from a result's settings; empty for a kinematic result."""
-    given = made.get("conditions") or {}
-    shown = {"vp", *unusual(given)}
-    return ", ".join(_term(name, value) for name, value in given.items() if name in shown)
 
 
 def not_printed(controllers: Mapping[str, Any]) -> dict[str, list[str]]:
@@ -77,14 +86,13 @@ def network_rules(controller: Any) -> str:
         return ""
     if "controller" in controller:
         return network_rules(controller["controller"])
+    if not {"order", "model_variant"} <= controller.keys():
+        return ""
     from hexmj.controllers.cruse1998 import ModelVariant, in_words
 
-    choices, variant = {field.name for field in fields(ModelVariant)}, controller.get("model_variant")
-    if "order" not in controller or not isinstance(variant, Mapping) or not choices <= variant.keys():
-        return ""  # another controller, such as Walknet
-    found = [f"{controller['order']} order"] if controller["order"] != "printed" else []
-    chosen = ModelVariant(**{name: variant[name] for name in choices})
-    return ", ".join(found + ([f"model variant {in_words(chosen)}"] if chosen != ModelVariant() else []))
+    variant = ModelVariant(**controller["model_variant"])
+    order = f"{controller['order']} order" if controller["order"] != "printed" else ""
+    return ", ".join(filter(None, [order, f"model variant {in_words(variant)}" if variant != ModelVariant() else ""]))
 
 
 def comparison_figure(result: "xr.Dataset") -> "Figure":
@@ -122,36 +130,15 @@ def flss_figure(result: "xr.Dataset") -> "Figure":
     return figure
 
 
-def _controllers(made: Mapping[str, Any], names: Iterable[str] | None) -> str:
+def _controllers(controllers: Mapping[str, Any], result: "xr.Dataset") -> str:
     """Return the names of a few controllers with what is not as printed in 1998, or only the latter for many."""
-    every = made.get("controllers", {})
-    shown = {name: every.get(name) for name in names if name in every} if names is not None else every
-    if len(shown) > FEW:
-        rules = not_printed(shown)
-        return "; ".join(f"{words}: {', '.join(map(in_figure, found))}" for words, found in rules.items())
-    rules = {name: network_rules(controller) for name, controller in shown.items()}
+    if axis := [result[name].values for name in ("controller", "entrant") if name in result.coords]:
+        controllers = {name: controllers[name] for name in np.ravel(axis[0]).tolist() if name in controllers}
+    if len(controllers) > FEW:
+        rules = not_printed(controllers)
+        return "; ".join(f"{words}: {', '.join(map(in_figure, names))}" for words, names in rules.items())
+    rules = {name: network_rules(controller) for name, controller in controllers.items()}
     return ", ".join(in_figure(name) + (f" ({words})" if words else "") for name, words in rules.items())
-
-
-def _walks(made: Mapping[str, Any]) -> list[str]:
-    """Return starts, observation time, seed and acceleration, as far as a result has them."""
-    time = made.get("observation_time")
-    words = [starts_in_words(made["starts"])] if "starts" in made else []
-    if time is not None:
-        words.append(f"observation time {f'of {time:g} time units' if isinstance(time, float) else time}")
-    words += [f"seed {made['seed']}"] if "seed" in made else []
-    if acceleration := made.get("acceleration"):
-        words.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
-    return words
-
-
-def _stride(stride: Mapping[str, Any]) -> str:
-    """Return what differs from the default stride."""
-    usual = asdict(Stride())
-    changed = [name for name in usual if name != "geometry" and stride.get(name, usual[name]) != usual[name]]
-    words = [_term(name, stride[name]) for name in changed]
-    lines = {name: [*values] for name, values in usual["geometry"].items()}
-    return ", ".join(words + (["other lines of the tips"] if stride.get("geometry", lines) != lines else []))
 
 
 def _term(name: str, value: Any) -> str:

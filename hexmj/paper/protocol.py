@@ -132,7 +132,7 @@ class Measurement:
     """Further arguments of the function."""
 
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
-        """Return the arguments of the function."""
+        """Return the arguments of the function besides velocity and seed."""
         networks = [protocol.network(self.preset, time, velocity) for time in OBSERVATION_TIMES]
         planned: dict[str, Any] = {"sets": tuple(networks)} if self.function is losses else {"controller": networks[0]}
         starts: dict[Any, int] = {losses: protocol.samples * protocol.sample, limit_regimes: protocol.gait_starts}
@@ -140,8 +140,7 @@ class Measurement:
         planned |= {"n_starts": starts[self.function]} if self.function in starts else {}
         stride = protocol.gait_stride if self.at == "gait_velocities" else protocol.stride
         procedure = protocol.acceleration if self.accelerated else None
-        walks = {"velocity": velocity, "seed": protocol.seed, "stride": stride, "acceleration": procedure}
-        return walks | planned | dict(self.own)
+        return planned | {"stride": stride, "acceleration": procedure} | dict(self.own)
 
 
 _losses = partial(Measurement, losses, "velocities")
@@ -173,4 +172,9 @@ def cells(name: str, protocol: Protocol) -> dict[float, Cell]:
     measurement = MEASUREMENTS[choice("measurement", name, MEASUREMENTS)]
     velocities: tuple[float, ...] = getattr(protocol, measurement.at)
     work = measurement.seconds / len(velocities)
-    return {v: Cell(f"{name} {v:g}", measurement.function, measurement.settings(v, protocol), work) for v in velocities}
+
+    def cell(v: float) -> Cell:
+        settings = {"velocity": v, "seed": protocol.seed} | measurement.settings(v, protocol)
+        return Cell(f"{name} {v:g}", measurement.function, settings, work)
+
+    return {v: cell(v) for v in velocities}

@@ -13,15 +13,15 @@ from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, OutOfReach, Refused, SimulationError
 from hexmj.measures.kinematic import first_loss
-from hexmj.measures.tables import columns
+from hexmj.measures.tables import columns, observed
 from hexmj.plain import plain
 from hexmj.progress import Progress, part_of
 from hexmj.search.algorithms import Domain
 from hexmj.search.forms import Form, NetworkForm
-from hexmj.starts import checked_velocities, draw_starts
+from hexmj.starts import draw_starts
 from hexmj.stats import wilson_intervals
 from hexmj.threads import thread_count
-from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, check_in_time, observation_duration, steps_within
+from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
 from hexmj.validate import choice, number
 from hexmj.variants import variants, varied
 
@@ -70,18 +70,15 @@ class Problem:
             raise InputError(f"form = {self.form!r:.80}; expected a NetworkForm or a FieldsForm")
         choice("over", self.over, get_args(Over))
         choice("ties", self.ties, get_args(Ties))
-        if not 0 <= number("low", self.low) <= number("high", self.high) < 1:
-            raise InputError(f"velocity range {self.low} to {self.high}; expected 0 <= low <= high < 1")
+        if self.low > self.high:
+            raise InputError(f"velocity range {self.low} to {self.high}; expected the least velocity first")
+        observed(sorted({self.low, self.high}), self.observation_time, self.stride, self.acceleration)
         if self.feedback and not self.conditions:
             raise InputError("feedback = True needs physical walks; the problem has no conditions")
         if self.conditions:
             check_ground(self.conditions)
         if self.over != "usual" and not isinstance(self.form, NetworkForm):
             raise InputError(f"over = {self.over!r} needs a form of the 1998 network")
-        ends = checked_velocities([self.low, self.high], 2, self.acceleration)
-        duration = observation_duration(self.observation_time, ends, self.stride, self.acceleration)
-        check_in_time(ends, duration, self.acceleration)
-        steps_within(duration, self.stride)
 
     @property
     def observation_times(self) -> list[str | float]:
@@ -94,8 +91,7 @@ class Problem:
 
         At a reach of 1 the greater magnitude of a parameter's ends is its unit.
         """
-        if not number("domain", reach, 0.0, 1e6):
-            raise InputError("domain = 0; expected a positive number")
+        number("domain", reach, 1e-6, 1e6)
         vector, unit = self.form.vector(begin) if begin else self.form.begin, np.abs(self.form.box(1.0)).max(axis=0)
         return Domain(*self.form.box(reach), self.form.binary, vector, unit)
 
@@ -165,11 +161,7 @@ class Sample:
         return []
 
     def settle(self, threads: int | None = None) -> None:
-        """Let the starts of all variants come to rest if candidates walk physically.
-
-        Raises:
-            InputError, SimulationError: a start does not.
-        """
+        """Let the starts of all variants come to rest if candidates walk physically, or raise SimulationError."""
         from hexmj.physics.settle import settle
 
         for one in self.variants.values():
@@ -179,19 +171,18 @@ class Sample:
     def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
         """Return G of each candidate, (candidate,), from (candidate, parameter)."""
         self.settle(threads)
+        problem = self.problem
 
         def cost(one: Sample, vector: np.ndarray, threads: int | None) -> float:
-            try:
-                candidate = one.problem.controller(vector)
-            except ValueError:
+            if problem.refusal(vector):
                 return REFUSED
             try:
-                return one._cost(candidate, threads)
+                return one._cost(one.problem.controller(vector), threads)
             except (OutOfReach, Refused, SimulationError):
                 return REFUSED
 
         # Plans of other controllers may share arrays of their module, and hold the interpreter's lock anyway.
-        if self.problem.conditions or len(vectors) == 1 or not isinstance(self.problem.form, NetworkForm):
+        if problem.conditions or len(vectors) == 1 or not isinstance(problem.form, NetworkForm):
             values = [[cost(one, vector, threads) for vector in vectors] for one in self.variants.values()]
         else:
             with ThreadPoolExecutor(thread_count(threads)) as pool:
