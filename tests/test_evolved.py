@@ -78,7 +78,7 @@ def test_what_was_found_falls_as_rarely_from_fresh_starts_as_is_written():
 
 
 def test_it_walks_a_tripod_with_short_steps():
-    """Nobody told it; at V = 0.5 its period is less than two thirds of a single leg's."""
+    """At V = 0.5 its period is less than two thirds of a single leg's."""
     found = gait(hexmj.walk(hexmj.draw_starts(10, 1), EVOLVED, 0.5, 20 * Stride().periods(0.5)))
     assert found.periodic.all()
     assert np.allclose(found.phase, 0.5, atol=0.05)

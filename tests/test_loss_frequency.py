@@ -97,7 +97,7 @@ def test_slabs_are_one_stream():
 @pytest.mark.slow
 @pytest.mark.parametrize("range_of", [1, 700, 1000, 1234, SLAB, SLAB + 1999, SLAB + 2000])
 def test_any_cut_counts_what_one_run_counts(tmp_path, range_of):
-    """Whatever the ranges' size and the order in which they are computed, and whoever computes them."""
+    """For any size of the ranges, in any order and on any executor."""
     size, velocities = (SLAB + 2000, [0.7]) if range_of >= SLAB else (3400, [0.5, 0.9]) if range_of > 1 else (12, [0.7])
     whole = flss(LDVS, velocities, n_starts=size, observation_time="start", seed=2)
     study = KinematicFlss(LDVS, velocities, size, "start", 2, range_of=range_of)

@@ -192,9 +192,9 @@ def test_restarted_starts_begin_anew_and_leave_the_others_alone():
     plan = LDVS.begin(starts, np.full(70, 0.4), STRIDE)
     plan.advance(300)
     plan.restart(which, tips)
-    after, anew, on = plan.advance(200), walk(tips, LDVS, 0.4, 20.0), walk(starts, LDVS, 0.4, 50.0)
-    assert np.array_equal(after.x[:, which], anew.x[:, which])
-    assert np.array_equal(after.stance[:, which], anew.stance[:, which])
+    after, begun, on = plan.advance(200), walk(tips, LDVS, 0.4, 20.0), walk(starts, LDVS, 0.4, 50.0)
+    assert np.array_equal(after.x[:, which], begun.x[:, which])
+    assert np.array_equal(after.stance[:, which], begun.stance[:, which])
     assert np.array_equal(after.x[:, ~which], on.x[300:, ~which])
 
 

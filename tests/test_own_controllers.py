@@ -86,18 +86,18 @@ def test_a_swing_ends_where_the_foot_meets_the_ground():
     ground = hexmj.Conditions(ground="step", ground_height=3.0)
     settled = settle(starts, ground, STRIDE)
     begun = feeler.begin(starts, np.full(6, 0.5), STRIDE)
-    told = [chunk.plan for chunk in drive(settled, begun, 120.0)]
-    height, stance = (np.concatenate([getattr(part, name) for part in told]) for name in ("height", "stance"))
+    plans = [chunk.plan for chunk in drive(settled, begun, 120.0)]
+    height, stance = (np.concatenate([getattr(part, name) for part in plans]) for name in ("height", "stance"))
     lands = stance[1:] & ~stance[:-1]
     assert (height[1:][lands] > 2.0).any(axis=0).any()
     paper = hexmj.walk(starts, feeler, 0.5, 120.0)
     assert (paper.height[1:][paper.stance[1:] & ~paper.stance[:-1]] <= 0.0).all()
-    assert np.array_equal(paper.x[0], told[0].x[0])
+    assert np.array_equal(paper.x[0], plans[0].x[0])
     assert not np.array_equal(paper.stance, stance)
 
 
 def test_a_foot_that_loses_the_ground_searches():
-    """Told that a standing foot has none, the plan lowers it until it is told otherwise, as deep as it may."""
+    """If a standing foot has no contact, the plan lowers it as deep as it may."""
     feeler, starts = hexmj.load_controller(OWN["feeler"]), np.zeros((2, 6))
     plan = feeler.begin(starts, np.full(2, 0.1), STRIDE)
     contact = np.ones((1, 6), dtype=bool)

@@ -110,7 +110,7 @@ def test_a_plan_may_write_into_its_own_arrays_again(settled):
 
 @dataclass(frozen=True)
 class Restless:
-    """Draws where its legs step anew, whenever it begins."""
+    """Shifts the tips by random numbers without a seed."""
 
     name: str = "restless"
 

@@ -71,10 +71,10 @@ def test_a_leg_at_the_end_of_its_stance_waits_while_it_carries_a_third_of_the_we
 def test_a_step_at_which_the_oscillators_diverge_is_refused() -> None:
     """Explicit steps hold at 0.2 time units up to V = 0.95; past that legs would be lifted at PEP_min alone."""
     starts = hexmj.draw_starts(20, 1)
-    for dt, velocity, told in (
+    for dt, velocity, refusal in (
         (0.2, 0.95, None),
         (0.5, 0.3, None),
         (0.5, 0.5, "dt = 0.5 and V_r = 0.5; expected a sho"),
     ):
-        with pytest.raises(InputError, match=told) if told else nullcontext():
+        with pytest.raises(InputError, match=refusal) if refusal else nullcontext():
             hexmj.first_loss(starts, BASELINES["righetti"], velocity, 200.0, stride=hexmj.Stride(dt=dt))

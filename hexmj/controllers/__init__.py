@@ -1,4 +1,4 @@
-"""Controllers: what tells the legs where to go.  `protocol` says what one is, `named` finds one by its name.
+"""Controllers plan the steps of the legs. `protocol` defines them, `registry` finds them by name.
 
 A controller of your own is a frozen dataclass with a `name` and a method `begin`; `stepwise` makes its plan from a
 function of one step.

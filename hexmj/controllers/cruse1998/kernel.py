@@ -26,7 +26,7 @@ REAR = tuple(n[0] if n else d for d, n in enumerate(N2))
 FRONT = tuple(n[0] if n else d for d, n in enumerate(N4))
 CONTRA = MIRROR
 
-# The six legs, and below the rows, are numbers of NumPy: for each literal one numba compiles a function anew.
+# The six legs, and below the rows, are numbers of NumPy: numba compiles a function again for each literal.
 L1, L2, L3, R1, R2, R3 = np.arange(6)
 
 # Rows of a block.  Six rows a variable, one for each leg: the tip x, the states s(t) and s(t - dt), AEP(t), and

@@ -69,9 +69,7 @@ class Weights:
             allowed[tuple(np.transpose(pairs(kind)))] = True
             if (stray := np.argwhere((matrix != 0) & ~allowed)).size:
                 d, e = (LEGS[leg] for leg in stray[0])
-                raise InputError(
-                    f"{kind} of leg {d} from leg {e} is not 0; expected 0, since {e} is no neighbour there"
-                )
+                raise InputError(f"{kind} of leg {d} from leg {e} is not 0; expected 0, since they are no neighbours")
             if kind in BINARY and not np.isin(matrix, (0.0, 1.0)).all():
                 raise InputError(f"{kind} is binary in the paper; expected only 0 or 1")
             matrix.setflags(write=False)
