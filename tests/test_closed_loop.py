@@ -1,5 +1,7 @@
 """Laws of the closed loop: with its own plan fed back it is the open loop, and it keeps the open loop's laws."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -41,7 +43,7 @@ def test_what_a_plan_is_told_is_what_the_chunks_show(settled, monkeypatch):
     """Before each step: angles and motion of now, forces and contacts of the physics step before."""
     told: list[Sensed] = []
     monkeypatch.setattr(SensedPlan, "sense", lambda _, sensed: told.append(sensed))
-    plan = READING.begin(settled.starts, np.full(12, 0.7), STRIDE)
+    plan: Any = READING.begin(settled.starts, np.full(12, 0.7), STRIDE)
     chunks = list(drive(settled, plan, 40.0))
     columns, m = settled.compiled.columns, settled.substeps
     fell = np.isin(np.arange(12), np.concatenate([one.ids[one.fell] for one in chunks]))
@@ -122,7 +124,7 @@ def told(tips: np.ndarray, gained: np.ndarray) -> Sensed:
 
 
 def test_a_swinging_foot_that_meets_the_ground_stands_there(settled):
-    plan = READING.begin(settled.starts, np.full(12, 0.5), STRIDE)
+    plan: Any = READING.begin(settled.starts, np.full(12, 0.5), STRIDE)
     while plan.advance(1).stance[0, 0].all():
         pass
     now = plan.advance(1)
@@ -141,7 +143,7 @@ def test_a_swinging_foot_that_meets_the_ground_stands_there(settled):
 def test_a_standing_leg_is_lifted_where_its_tip_is_read(settled):
     """Its target takes up the tip as read when the leg changes its state, and only then."""
     starts, none = settled.starts, np.zeros((1, 6), dtype=bool)
-    plan = hexmj.SensoryFeedback(UNCOORDINATED).begin(starts, np.full(12, 0.5), STRIDE)
+    plan: Any = hexmj.SensoryFeedback(UNCOORDINATED).begin(starts, np.full(12, 0.5), STRIDE)
     for behind, stands in ((0.3, True), (-25.0, False)):
         tips = np.full((1, 6), 5.0)
         tips[0, 2] = starts[0, 2] - behind if stands else behind

@@ -23,7 +23,6 @@ from hexmj import (
     walk,
 )
 from hexmj.controllers.cruse1998.weights import general
-from hexmj.controllers.feedback import SensedPlan
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Sensed
 from hexmj.stability import stability_margin, walk_margin
@@ -64,7 +63,7 @@ def plan(kind, postures=None, acceleration=None, threads=None) -> DisturbedPlan:
     return plan
 
 
-def sensing(postures=None, acceleration=None, kind="halt") -> SensedPlan:
+def sensing(postures=None, acceleration=None, kind="halt") -> Any:
     disturbed = Disturbed(LDVS, disturbance(kind), postures, slows=acceleration is not None)
     return SensoryFeedback(disturbed).begin(STABLE.starts, np.full(len(STABLE.starts), V), STRIDE, acceleration)
 
