@@ -20,15 +20,9 @@ if TYPE_CHECKING:
     from hexmj.physics.settle import Settled
 
 UNITS = {
-    "planned_loss": "time unit",
-    "measured_loss": "time unit",
-    "fall": "time unit",
-    "topple": "time unit",
-    "clearance": "mm",
-    "tilt": "rad",
-    "slip": "mm/s",
-    "tracking": "mm",
-    "depth": "mm",
+    **dict.fromkeys(("planned_loss", "measured_loss", "fall", "topple"), "time unit"),
+    **dict.fromkeys(("clearance", "tracking", "depth"), "mm"),
+    **{"tilt": "rad", "slip": "mm/s"},
 }
 """Units of `Outcomes`; the others are numbers."""
 

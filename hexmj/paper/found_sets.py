@@ -5,7 +5,6 @@ from functools import cache
 from pathlib import Path
 
 from hexmj.controllers.cruse1998 import MODEL_VARIANTS, Cruse1998, ModelVariant, Symmetric
-from hexmj.errors import InputError
 from hexmj.files import read_toml
 
 TABLE = Path(__file__).with_name("ideal.toml")
@@ -34,11 +33,7 @@ class FoundSet:
 
 @cache
 def found_sets(path: Path = TABLE) -> tuple[FoundSet, ...]:
-    """Return all sets of a table.
-
-    Raises:
-        InputError: the table holds two sets for the same place.
-    """
+    """Return all sets of a table."""
     found = []
     for entry in read_toml(path)["set"]:
         velocities, time = entry["velocities"], entry["observation_time"]
@@ -47,8 +42,6 @@ def found_sets(path: Path = TABLE) -> tuple[FoundSet, ...]:
         model_variant = MODEL_VARIANTS[entry.get("model_variant", "printed")]
         controller = Cruse1998(weights, name=name, model_variant=model_variant)
         found.append(FoundSet(time, velocities[0], velocities[-1], controller, entry["seed"]))
-    if len({one.place for one in found}) < len(found):
-        raise InputError(f"{path} holds two sets for the same observation time, velocities and model variant")
     return tuple(found)
 
 

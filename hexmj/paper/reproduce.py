@@ -90,18 +90,13 @@ class Report:
     @cached_property
     def summary(self) -> list[str]:
         """Sentences that count the verdicts, and say if the starts are those of the searches."""
-        return [*summary(self.rows), *self._searched, *self._beside]
-
-    @property
-    def _searched(self) -> list[str]:
-        if (seed := self.protocol.seed) not in {one.seed for one in found_sets()}:
-            return []
-        return [f"seed {seed}: ideal sets were searched on these starts, where they look better than they are"]
-
-    @property
-    def _beside(self) -> list[str]:
-        counts = {name: summary([Row(row.claim, row.beside[name]) for row in self.rows]) for name in self.variants}
-        return [f"model variant {name}, {line}" for name, lines in counts.items() for line in lines]
+        lines = summary(self.rows)
+        if (seed := self.protocol.seed) in {one.seed for one in found_sets()}:
+            lines.append(f"seed {seed}: ideal sets were searched on these starts, where they look better than they are")
+        for name in self.variants:
+            counts = summary([Row(row.claim, row.beside[name]) for row in self.rows])
+            lines += [f"model variant {name}, {count}" for count in counts]
+        return lines
 
     def markdown(self) -> str:
         """Return the table, the rule of every row, and the command that recomputes it."""
@@ -109,8 +104,7 @@ class Report:
         size = f"{p.samples} times {p.sample} starts, gaits from {p.gait_starts} starts"
         head = f"{size}; seed {p.seed}.  An answer is the number that strains the rule most, with its 95 % interval,"
         lines = ["# The claims of the 1998 paper", "", f"{head} and where.", ""]
-        lines += [*(f"- {one}" for one in [*summary(self.rows), *self._searched]), ""]
-        lines += [*(f"- {one}" for one in self._beside), ""] if self.variants else []
+        lines += [*(f"- {sentence}" for sentence in self.summary), ""]
         rows = [[cell.replace("differs:", "**differs**:") for cell in _cells(row)] for row in self.rows]
         lines += [*io.markdown_table(_heads(self.variants), rows), "", "## Rules and commands", ""]
         rules = [(row.claim.text, row.claim.rule.words, f"`{self.command(row)}`") for row in self.rows]

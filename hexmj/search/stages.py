@@ -188,10 +188,7 @@ Evaluated = tuple[str, np.ndarray, np.ndarray]
 def history(evaluated: Sequence[Evaluated], names: Sequence[str], minimised: str) -> "xr.Dataset":
     """Return stage, candidate, cost and least cost so far of the stage over `evaluation`, counted from 0.
 
-    Args:
-        evaluated: in the order of evaluation.
-        names: of the parameters.
-        minimised: the cost in words.
+    `names` are those of the parameters, and `minimised` is the cost in words.
     """
     import xarray as xr
 
@@ -201,7 +198,7 @@ def history(evaluated: Sequence[Evaluated], names: Sequence[str], minimised: str
     for number in range(len(STAGES)):
         best[stage == number] = np.minimum.accumulate(cost[stage == number])
     candidates = np.concatenate([candidates for _, candidates, _ in evaluated])
-    flags = {"flag_values": list(range(len(STAGES))), "flag_meanings": " ".join(STAGES)}
+    flags = {"flag_values": [0, 1], "flag_meanings": " ".join(STAGES)}
     return xr.Dataset(
         {
             "stage": ("evaluation", stage, flags),
