@@ -20,8 +20,8 @@ from hexmj.search.stages import history
 from hexmj.studies.ablation import Ablation, switched
 from hexmj.studies.biology import Biology
 from hexmj.studies.disturbance import DisturbedWalks
-from hexmj.studies.entrants import entrants
 from hexmj.studies.league import League
+from hexmj.studies.league_cells import entrants
 from hexmj.studies.stability_map import StabilityMap
 from hexmj.studies.static_limit import StaticLimit
 from hexmj.studies.terrain import Terrain

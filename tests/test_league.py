@@ -22,9 +22,8 @@ from hexmj.measures.tables import frequencies, happened
 from hexmj.physics.settle import settle
 from hexmj.starts import draw_starts
 from hexmj.stats import paired_difference
-from hexmj.studies.entrants import EVERYONE, Entrant, entrants, short_names
 from hexmj.studies.league import League
-from hexmj.studies.league_cells import EntrantWalks, unless_refused
+from hexmj.studies.league_cells import EVERYONE, Entrant, EntrantWalks, entrants, short_names, unless_refused
 from hexmj.studies.league_figure import FEWER, NOTHING, league_figure, walks_figure
 from hexmj.studies.standings import TRIALS, by_rank, league_markdown, ranks, tables
 from hexmj.sweep import run_cells

@@ -14,8 +14,8 @@ from hexmj.measures.kinematic import KinematicFlss
 from hexmj.studies.ablation import Ablation
 from hexmj.studies.biology import Biology
 from hexmj.studies.disturbance import DisturbedWalks
-from hexmj.studies.entrants import Entrant
 from hexmj.studies.league import League
+from hexmj.studies.league_cells import Entrant
 from hexmj.studies.stability_map import StabilityMap
 from hexmj.studies.terrain import Terrain
 

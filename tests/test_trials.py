@@ -14,8 +14,8 @@ from hexmj.controllers.wrappers import RISE, LegLost, PoorSenses
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
-from hexmj.studies.entrants import Entrant
 from hexmj.studies.league import DISTURBED, GROUNDS, League, crossed
+from hexmj.studies.league_cells import Entrant
 from hexmj.studies.standings import TRIALS
 from hexmj.timing import Stride
 

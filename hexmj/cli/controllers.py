@@ -58,8 +58,8 @@ class League(StudyCommand):
     examples = ("--quick", "--controller ldvs mine.py:Mine --velocity 0.5 --no-video")
 
     def build(self, given: SimpleNamespace) -> Any:
-        from hexmj.studies.entrants import EVERYONE, FOUR, IDEAL, entrants
         from hexmj.studies.league import League
+        from hexmj.studies.league_cells import EVERYONE, FOUR, IDEAL, entrants
 
         names = (FOUR if given.quick else EVERYONE) if given.controller is None else given.controller
         distinct("--controller", names)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +15,8 @@ from hexmj.measures.figures import caption
 from hexmj.measures.tables import FRESH, PERIODS, differences, frequencies, happened, padded, velocity_axis
 from hexmj.plotting import head, heat_map, in_figure, picture, velocity_columns
 from hexmj.studies.base import Study
-from hexmj.studies.entrants import Entrant, short_names
 from hexmj.studies.league import REGIMES
-from hexmj.studies.league_cells import EntrantWalks
+from hexmj.studies.league_cells import Entrant, EntrantWalks, short_names
 from hexmj.sweep import Cell
 from hexmj.validate import whole
 
@@ -47,11 +47,9 @@ def wholes(names: Sequence[str]) -> dict[str, dict[str, Controller]]:
 
 
 def switched(name: str, shown: str = "") -> dict[str, Controller]:
-    """Return the whole controller and its changes by the `SWITCHES` that make a difference, by name.
+    """Return the whole controller and its changes by the `SWITCHES` that make a difference.
 
-    Args:
-        name: of the whole, as of `load_controller`.
-        shown: its name in the result, by default the same.
+    They are named by `shown`, by default the same as `name`.
 
     Raises:
         InputError: there is no such controller, or it has nothing to switch.
@@ -101,26 +99,19 @@ class Ablation(Study):
 
     def cells(self) -> list[Cell]:
         """Return a cell for each controller, measure and velocity."""
-
-        def cell(name: str, controller: Controller, measure: str, velocity: float, time: float) -> Cell:
-            few = {"limit": min(self.n_starts, REGIMES), "physical": min(self.physical_starts, self.n_starts)}
-            until = "start" if measure == "start" else "walk"
-            n_starts = few.get(measure, self.n_starts)
-            walks = EntrantWalks(Entrant(controller), velocity, until, n_starts, self.seed, self.stride)
-            name = f"{name}-{measure}-V-{velocity:g}"
-            if measure == "limit":
-                return Cell(name, walks.gaits, {"periods": self.periods}, 10 * time)
-            if measure == "physical":
-                return Cell(name, walks.outcomes, {"controller": controller, "conditions": self.conditions}, 20 * time)
-            return Cell(name, walks.losses, {}, time)
-
         self.check_walks(self.velocities, self.conditions)
-        return [
-            cell(name, controller, measure, float(v), float(time))
-            for name, controller in self.plans().items()
-            for measure in MEASURES
-            for v, time in zip(*self.observed, strict=True)
-        ]
+        observed = [*zip(*(axis.tolist() for axis in self.observed), strict=True)]
+        few = {"limit": min(self.n_starts, REGIMES), "physical": min(self.physical_starts, self.n_starts)}
+        cells = []
+        for (name, controller), measure, (v, time) in product(self.plans().items(), MEASURES, observed):
+            until, n_starts = "start" if measure == "start" else "walk", few.get(measure, self.n_starts)
+            walks = EntrantWalks(Entrant(controller), v, until, n_starts, self.seed, self.stride)
+            function, own, cost = {
+                "limit": (walks.gaits, {"periods": self.periods}, 10),
+                "physical": (walks.outcomes, {"controller": controller, "conditions": self.conditions}, 20),
+            }.get(measure, (walks.losses, {}, 1))
+            cells.append(Cell(f"{name}-{measure}-V-{v:g}", function, own, cost * time))
+        return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return how often events happen, with and without parts.

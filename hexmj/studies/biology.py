@@ -171,7 +171,6 @@ class Biology(Study):
     periods: int = 30
     """Periods of a single leg that each start walks; the last three are measured."""
     n_starts: int = field(default=20, kw_only=True)
-    """Number of random starts, the same at every speed."""
 
     hidden: ClassVar[tuple[str, ...]] = ("grasp", *GROUND)
 

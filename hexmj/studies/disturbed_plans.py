@@ -18,6 +18,7 @@ from hexmj.controllers.protocol import (
     SteerablePlan,
     check_steerable,
 )
+from hexmj.controllers.wrappers import WrappedPlan
 from hexmj.errors import InputError
 from hexmj.gaits import steady_state_gait
 from hexmj.stability import stability_margin, walk_margin
@@ -182,15 +183,15 @@ class Disturbed:
         return DisturbedFeedbackPlan(self, plan) if isinstance(plan, FeedbackPlan) else DisturbedPlan(self, plan)
 
 
-class DisturbedPlan:
+class DisturbedPlan(WrappedPlan):
     """A `protocol.SteerablePlan` of a `Disturbed` controller."""
 
     def __init__(self, controller: Disturbed, plan: SteerablePlan) -> None:
         """Wrap a plan at time 0."""
-        self._plan, self._disturbance, self._postures = plan, controller.disturbance, controller.postures
-        self.starts, self.stride, self.done = plan.starts, plan.stride, 0
-        self.made_for, self._slows = getattr(plan, "made_for", None), controller.slows
+        super().__init__(plan)
+        self._disturbance, self._postures, self._slows = controller.disturbance, controller.postures, controller.slows
         self._step, self._sensed = self._disturbance.step.copy(), False
+        self.restart, self.slow_down = plan.restart, plan.slow_down
         self._stops = self._disturbance.kind == "halt" or self._postures is not None
         self._rests: dict[int, Rest] = {}
         self._tips, self._standing = np.array(self.starts), np.ones(self.starts.shape, dtype=bool)
@@ -226,14 +227,6 @@ class DisturbedPlan:
     def standing(self) -> np.ndarray:
         """See `protocol.SteerablePlan`."""
         return self._plan.standing
-
-    def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
-        """See `protocol.SteerablePlan`."""
-        self._plan.restart(which, tips)
-
-    def slow_down(self, which: np.ndarray) -> None:
-        """See `protocol.SteerablePlan`."""
-        self._plan.slow_down(which)
 
     def _disturb(self, which: np.ndarray) -> None:
         """Disturb these starts, (start,): set how long they rest, and the legs with which they continue."""
@@ -290,4 +283,4 @@ class DisturbedFeedbackPlan(DisturbedPlan):
     def sense(self, sensed: Sensed) -> None:
         """Pass on the sensed legs."""
         self._sensed = True
-        self._plan.sense(sensed)  # pyright: ignore[reportAttributeAccessIssue]
+        self._plan.sense(sensed)

@@ -83,17 +83,10 @@ class StableStarts:
 def find_stable_starts(
     controller: Controller, velocity: float, n_starts: int, seed: int, stride: Stride, grid: int
 ) -> StableStarts:
-    """Return the first starts whose plan is stable until the disturbance.
+    """Return the seed's first starts whose plan is stable until the disturbance.
 
-    Times of the disturbance are uniform within one period of a single leg, after `SETTLED` of them.
-
-    Args:
-        controller: plans the walks at V_r = `velocity`.
-        velocity: V_r.
-        n_starts: number of starts to find.
-        seed: of starts, times and legs.
-        stride: of the plans.
-        grid: steps of which every time is a multiple.
+    Times of the disturbance are multiples of `grid` steps, and uniform within one period of a single leg, after
+    `SETTLED` of them.
 
     Raises:
         TooFewStable: fewer than `n_starts` of `MOST_DRAWN` starts are stable for so long.
@@ -208,7 +201,7 @@ class StableWalks:
             observation_time: time for which all walk after they are at V again [time units].
             recovery: of the strategy 'slow_down'.
             conditions: of the physical walk; without them the walk is kinematic.
-            threads: by default one per core; the times do not depend on it.
+            threads: by default one per core.
             which: indices of some starts, (n,), which walk as long as if all did; by default all.
 
         Raises:

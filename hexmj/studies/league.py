@@ -12,8 +12,7 @@ from hexmj.gaits import CYCLES
 from hexmj.measures.tables import FRESH, PERIODS
 from hexmj.studies.base import GROUND, Study
 from hexmj.studies.disturbed_walks import Case
-from hexmj.studies.entrants import Entrant
-from hexmj.studies.league_cells import EntrantWalks
+from hexmj.studies.league_cells import Entrant, EntrantWalks
 from hexmj.studies.standings import LEGS_LOST, TRIALS, standings
 from hexmj.sweep import Cell
 from hexmj.timing import Acceleration, observation_duration

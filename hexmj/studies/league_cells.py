@@ -1,29 +1,102 @@
-"""Cells of the league: kinematic losses and steady-state gaits, and physical walks with their costs and trials."""
+"""Entrants of a league or an ablation, and their cells: kinematic losses, steady-state gaits, falls and trials."""
 
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hexmj.conditions import Conditions
+from hexmj.controllers.baselines import BASELINES
+from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.planning import begin, check_repeats
-from hexmj.controllers.protocol import Controller
+from hexmj.controllers.protocol import Controller, FeedbackPlan, is_steerable
+from hexmj.controllers.registry import VARIED, known_names, load_controller
 from hexmj.controllers.wrappers import LegLost
-from hexmj.errors import OutOfReach, SimulationError, StillThrown
+from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
 from hexmj.gaits import steady_state_gait
+from hexmj.legs import LEGS
 from hexmj.measures.cells import UNITS
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.tables import happened, over_start
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import GRID, Case, StableWalks, TooFewStable
-from hexmj.studies.entrants import Entrant
 from hexmj.timing import Acceleration, Stride, observation_duration, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
+
+IDEAL = "-ideal"
+"""End of the name of an entrant that begins at an ideal start."""
+
+NETWORK = ("uncoordinated", "hws", "ldvs", "own", "own-0.3", "own-0.5", "robust-0.1", "lasting", "lasting-0.3")
+"""Weight sets of the 1998 network that take part."""
+
+EVERYONE = (*NETWORK, *BASELINES, *(f"{name}{IDEAL}" for name in ("wilson", "graham")))
+"""The whole league."""
+
+FOUR = ("ldvs", "uncoordinated", "wilson", "graham-ideal")
+"""Entrants of a quick look."""
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """A controller, and how it begins."""
+
+    controller: Controller
+    ideal: bool = False
+    """Whether it begins at its `ideal_start(velocity, stride)`, (1, leg) tips [mm], the same for all walks."""
+
+    def __post_init__(self) -> None:
+        if self.ideal and not hasattr(self.controller, "ideal_start"):
+            raise InputError(f"controller = {self.controller.name} has no ideal_start")
+
+    def starts(self, n_starts: int, seed: int, velocity: float, stride: Stride) -> np.ndarray:
+        """Return random starts, (start, leg) [mm], or the ideal one alone."""
+        if not self.ideal:
+            return draw_starts(n_starts, seed, stride)
+        controller: Any = self.controller
+        start = np.array(controller.ideal_start(velocity, stride), dtype=float)
+        if start.shape != (1, len(LEGS)):
+            raise InputError(f"ideal_start of {self.controller.name} has the shape {start.shape}; expected (1, 6)")
+        return start
+
+    def reading(self, velocity: float, stride: Stride) -> Controller | None:
+        """Return the controller with sensory feedback, if it has it or its plans can be steered."""
+        if isinstance(begin(self.controller, draw_starts(1, 0, stride), velocity, stride), FeedbackPlan):
+            return self.controller
+        return SensoryFeedback(self.controller) if self.steerable else None
+
+    @property
+    def steerable(self) -> bool:
+        """Whether the controller can be halted, and a leg of it stopped."""
+        return is_steerable(self.controller)
+
+
+def entrants(names: Sequence[str], load: Callable[[str], Controller] = load_controller) -> Mapping[str, Entrant]:
+    """Return entrants by `short_names`, from names of controllers, with the end `IDEAL` for an ideal start.
+
+    Raises:
+        InputError: there is no such controller, or it has no ideal start.
+    """
+    plain = {name: name.removesuffix(IDEAL) for name in names}
+    found = {name: load(name) for name in plain.values()}
+    short = short_names(found)
+    return {short[own] + IDEAL * (own != name): Entrant(found[own], ideal=own != name) for name, own in plain.items()}
+
+
+def short_names(found: Mapping[str, Controller]) -> dict[str, str]:
+    """Return distinct names for tables: known names as they are, others as the loaded controllers call themselves."""
+    known, short = {*known_names()}, {}
+    for name, controller in found.items():
+        varied = VARIED.fullmatch(name)
+        short[name] = name if (varied["name"] if varied else name) in known else controller.name
+    often = Counter(short.values())
+    return {name: name if often[shown] > 1 else shown for name, shown in short.items()}
+
 
 REFUSALS = OutOfReach, SimulationError, StillThrown
 """Errors of a walk that has no outcome."""
@@ -94,12 +167,7 @@ class EntrantWalks:
         return over_start(columns, {"reached": "time unit"})
 
     def outcomes(self, controller: Controller, conditions: Conditions, threads: int | None = None) -> "xr.Dataset":
-        """Return the outcome of every physical walk.
-
-        Args:
-            controller: the entrant's own, or a changed one.
-            conditions: of the walks.
-            threads: by default one per core.
+        """Return the outcome of every physical walk with the entrant's controller, or a changed one.
 
         Returns:
             All `Outcomes`; the `work` of the joints over the insect's weight [mm] and the greatest `torque` over its
@@ -163,20 +231,18 @@ def unless_refused(
     Args:
         walked: walks some of the starts, (n,); the outcome of a start must not depend on the others.
         n_starts: number of all starts.
-        columns: columns of the outcomes, and their units.
+        columns: names of the outcomes, and their units.
     """
     import xarray as xr
 
-    everyone = np.arange(n_starts)
+    everyone, alone = np.arange(n_starts), list[xr.Dataset]()
     with suppress(*REFUSALS):
         return walked(everyone)
-    nothing = xr.Dataset({name: ("start", [np.nan], {"units": units}) for name, units in columns.items()})
-    alone: list[xr.Dataset] = []
     for start in everyone[:, np.newaxis]:
         try:
             alone.append(walked(start))
         except REFUSALS:
-            alone.append(nothing)
+            alone.append(over_start({name: np.array([np.nan]) for name in columns}, columns))
     return xr.concat(alone, "start")
 
 

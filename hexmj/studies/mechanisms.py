@@ -90,14 +90,8 @@ def static_plan(walk: "PhysicalWalk") -> Walk:
 
 
 def _fall(tipping: np.ndarray, last: np.ndarray, least: float, narrow: float) -> int:
-    """Return the mechanism of a fall.
-
-    Args:
-        tipping: lean of the trunk while it was tipped, (step, 2).
-        last: its lean at last, (2,).
-        least: least margin of the plan within the time constant before [mm].
-        narrow: margin that is narrow [mm].
-    """
+    """Return the mechanism of a fall, from the lean of the tipped trunk, (step, 2), its `last` lean, (2,), the least
+    margin of the plan within the time constant before, and the margin that is narrow [mm]."""
     if (tipping @ last < 0.0).any():
         return _NUMBER["thrown"]
     if least > 0.0:

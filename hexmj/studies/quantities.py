@@ -137,34 +137,26 @@ def last_strides(
 
     Args:
         settled: starts at rest, with sensors of the feet's forces.
-        controller: plans the walks at V_r = `velocity`.
-        duration: observation time [time units].
-        measured: last part of it [time units].
-        threads: by default one per core.
+        controller, velocity, duration, threads: as of a `WalkSettings`.
+        measured: last part of the duration [time units].
     """
     from hexmj.physics.rollout import drive
 
     plan = begin(controller, settled.starts, velocity, settled.stride, None, threads)
     first = (duration - measured) / settled.stride.dt * settled.substeps
     chunks = [chunk for chunk in drive(settled, plan, duration, threads=threads) if chunk.first >= first]
-    walked = chunks[-1].ids[~chunks[-1].fell] if chunks else ()
-    hop = rows_of_a_hop(settled)
-    for start in walked:
+    for start in chunks[-1].ids[~chunks[-1].fell] if chunks else ():
         standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
-        begun = onsets(standing, hop)
+        begun = onsets(standing, rows_of_a_hop(settled))
         begun = begun[begun > 1]  # not the strides that begin from rest
         if len(begun) > 1:
             yield int(start), strides_between(settled, chunks, start, begun)
 
 
 def strides_between(settled: "Settled", chunks: "Sequence[Chunk]", start: int, begun: np.ndarray) -> Strides:
-    """Return the strides of one start between rows in which leg 1 lifts off.
+    """Return the strides of one start between rows in which leg 1 lifts off, `begun`, of consecutive chunks.
 
-    Args:
-        settled: starts at rest.
-        chunks: consecutive parts of the walks, with the forces of the feet.
-        start: index of the start.
-        begun: rows of lift-off: at least two, none among the first two rows.
+    There are at least two such rows, none among the first two.
     """
     columns, h = settled.compiled.columns, settled.compiled.model.opt.timestep
     m, rows = settled.substeps, slice(begun[0], begun[-1])
@@ -172,15 +164,15 @@ def strides_between(settled: "Settled", chunks: "Sequence[Chunk]", start: int, b
         np.concatenate([getattr(chunk, name)[chunk.ids == start][0] for chunk in chunks])
         for name in ("qpos", "sensors", "torque", "standing")
     )
-    moved = np.diff(qpos, axis=0) / h  # row t is the velocity at row t + 1
+    moved, before = np.diff(qpos, axis=0) / h, slice(begun[0] - 1, begun[-1] - 1)  # row t: velocity at row t + 1
     return Strides(
         count=len(begun) - 1,
         step=h,
         hop=rows_of_a_hop(settled),
         qpos=qpos[rows],
-        velocity=moved[begun[0] - 1 : begun[-1] - 1, :3],
-        turning=moved[begun[0] - 1 : begun[-1] - 1, columns.qpos],
-        torques=torque[begun[0] - 1 : begun[-1] - 1],
+        velocity=moved[before, :3],
+        turning=moved[before, columns.qpos],
+        torques=torque[before],
         standing=standing[rows],
         centre=sensors[rows, columns.centre_of_mass],
         every=m,
@@ -209,19 +201,15 @@ def quantity_table(walks: WalkSettings, measured: float, threads: int | None = N
         walks: settings of the walks.
         measured: last part of the walks that counts [time units].
         threads: by default one per core.
-
-    Raises:
-        InputError: the strides do not fit into memory.
     """
     import xarray as xr
 
     from hexmj.physics.settle import Settling
 
-    n_starts, conditions, stride = walks.n_starts, walks.conditions, walks.stride
-    steps = measured / stride.dt * conditions.substeps(stride)
-    check_memory(f"the last strides of {n_starts} starts", KEPT * steps * n_starts)
-    settled = Settling(conditions, stride, threads, pushes=True).at(walks.starts)
-    values = np.full((len(UNITS), n_starts), np.nan)
+    steps = measured / walks.stride.dt * walks.conditions.substeps(walks.stride)
+    check_memory(f"the last strides of {walks.n_starts} starts", KEPT * steps * walks.n_starts)
+    settled = Settling(walks.conditions, walks.stride, threads, pushes=True).at(walks.starts)
+    values = np.full((len(UNITS), walks.n_starts), np.nan)
     for start, strides in last_strides(settled, walks.controller, walks.velocity, walks.duration, measured, threads):
         values[:, start] = list(quantities(strides, settled.compiled).values())
     return xr.Dataset({"value": (("quantity", "start"), values, {"units": "of the quantity"})}, {"quantity": [*UNITS]})

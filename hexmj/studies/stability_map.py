@@ -123,14 +123,14 @@ class StabilityMap(Study):
 
     def cells(self) -> list[Cell]:
         """Return a cell for each value and velocity."""
-
-        def cell(conditions: Conditions, velocity: float, time: float) -> Cell:
-            name = f"{self.over}-{conditions.values()[self.over]:g}-V-{velocity:g}"
-            walks = self.walks(velocity, time, conditions)
-            return Cell(name, fates, {"walks": walks, "over": self.over}, time * conditions.substeps(self.stride))
-
         self.check_walks(self.velocities, *self.varied)
-        return [cell(conditions, v, time) for conditions in self.varied for v, time in zip(*self.observed, strict=True)]
+        cells = []
+        for value, conditions in zip(self.chosen, self.varied, strict=True):
+            for v, time in zip(*self.observed, strict=True):
+                own = {"walks": self.walks(v, time, conditions), "over": self.over}
+                work = time * conditions.substeps(self.stride)
+                cells.append(Cell(f"{self.over}-{value:g}-V-{v:g}", fates, own, work))
+        return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return outcomes, frequencies, and the differences that dynamics and the condition make.
@@ -167,21 +167,15 @@ class StabilityMap(Study):
 
 
 def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dataset":
-    """Return what happens to every start in one cell.
+    """Return what happens to every start in one cell of a map over a condition.
 
     Starts that cannot stand on six feet, or do not reach nine of ten tips, are left out.
-
-    Args:
-        walks: settings of the walks.
-        over: the condition that the map varies.
-        threads: by default one per core.
 
     Returns:
         Over start: every field of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad].
 
     Raises:
-        InputError: no start is left.
-        SimulationError: a walk diverges.
+        InputError, SimulationError: no start is left, or a walk diverges.
     """
     stands = standing_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
     blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
@@ -229,11 +223,10 @@ def with_differences(data: "xr.Dataset", reference: float) -> "xr.Dataset":
     """Add the frequencies, differences and counts of `StabilityMap.result` to the outcomes of its cells."""
     cells = ("value", "velocity")
     events = {name: happened(data[outcome]).transpose(*cells, "start").values for name, outcome in FLSS.items()}
-    new: dict[str, Any] = {}
-    for measure, lost in events.items():
-        new |= frequency(measure, lost, cells)
     fell, static = events["physical"], events["static"]
-    new |= frequency("saved", np.where(static == 1.0, 1.0 - fell, np.nan), cells)
+    new: dict[str, Any] = {}
+    for measure, lost in (events | {"saved": np.where(static == 1.0, 1.0 - fell, np.nan)}).items():
+        new |= frequency(measure, lost, cells)
     row = data.value.values.tolist().index(reference)
     new |= differences("dynamics", fell, static, cells) | differences("change", fell, fell[row], cells)
     names = data.mechanism.transpose(*cells, "start").values

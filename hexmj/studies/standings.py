@@ -11,7 +11,7 @@ from hexmj.measures.figures import network_rules, starts_in_words
 from hexmj.measures.tables import VELOCITY, differences, frequencies, happened, padded
 from hexmj.phases import circular_mean
 from hexmj.stats import paired_difference
-from hexmj.studies.entrants import Entrant
+from hexmj.studies.league_cells import Entrant
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -112,7 +112,6 @@ class StaticLimit(Study):
     acceleration: Acceleration | None = None
     """The accelerating procedure of Eq. 11."""
     n_starts: int = field(default=200, kw_only=True)
-    """Number of random starts, the same for every V_p and mass."""
     conditions: Conditions = field(default=FINE, kw_only=True)
 
     hidden: ClassVar[tuple[str, ...]] = ("vp", "leg_mass")
@@ -128,21 +127,15 @@ class StaticLimit(Study):
         """The conditions at each mass of the legs and V_p."""
         return [replace(self.conditions, leg_mass=mass, vp=vp) for mass, vp in product(self.leg_masses, self.vps)]
 
-    @property
-    def duration(self) -> float:
-        """Observation time [time units]."""
-        return self.observed[1].item()
-
     def cells(self) -> list[Cell]:
         """Return a cell for each mass of the legs and V_p."""
-
-        def cell(conditions: Conditions) -> Cell:
-            name = f"leg-mass-{conditions.leg_mass:g}-vp-{conditions.vp:g}"
-            walks = self.walks(self.velocity, self.duration, conditions)
-            return Cell(name, distance_table, {"walks": walks}, conditions.substeps(self.stride))
-
         self.check_walks([self.velocity], *self.varied)
-        return [cell(conditions) for conditions in self.varied]
+        cells = []
+        for conditions in self.varied:
+            name = f"leg-mass-{conditions.leg_mass:g}-vp-{conditions.vp:g}"
+            walks = self.walks(self.velocity, self.observed[1].item(), conditions)
+            cells.append(Cell(name, distance_table, {"walks": walks}, conditions.substeps(self.stride)))
+        return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return FLSS, agreement and distances from the plan.
@@ -163,7 +156,8 @@ class StaticLimit(Study):
             same = (table[LOSSES[measure]] < np.inf) == lost
             attrs = {"units": "1", "long_name": f"kinematic and {measure} answer agree"}
             table[f"agreement_{measure}"] = same.mean("start").assign_attrs(attrs)
-        return self.labelled(with_flss(table, LOSSES), "converge", velocity=self.velocity, duration=self.duration)
+        own = {"velocity": self.velocity, "duration": self.observed[1].item()}
+        return self.labelled(with_flss(table, LOSSES), "converge", **own)
 
 
 def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Dataset":
@@ -189,26 +183,24 @@ def distances(walk: "PhysicalWalk") -> dict[str, np.ndarray]:
     plan, measured, near = walk.ordered, walk.measured, grounded(walk)
     compared = plan.time[:, None] < np.minimum(loss_time(plan), walk.outcomes.fall)
     wanted, pressure = walk_margin(plan), pressure_margin(walk)
-    with np.errstate(invalid="ignore"):  # steps without a standing foot, which do not count
-        off, off_grounded = (np.abs(walk_margin(feet) - wanted) for feet in (measured, near))
     same, same_near = ((feet.stance == plan.stance).all(axis=-1) for feet in (measured, near))
     drift = np.linalg.norm(walk.centre_of_mass[..., :2] - walk.qpos[..., :2], axis=-1)
     touching = compared & measured.stance.any(axis=-1)  # there is no margin without a foot
-    return {
-        "margin": _mean(off, touching),
-        "margin_grounded": _mean(off_grounded, touching),
-        "margin_pressure": _mean(np.abs(pressure - wanted), compared & np.isfinite(pressure)),
-        "margin_same_feet": _mean(off, touching & same),
-        "same_feet": _mean(same, compared),
-        "same_feet_grounded": _mean(same_near, compared),
-        "drift": _mean(drift, compared),
-    }
-
-
-def _mean(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Return the mean over the steps that count, (start,), from two arrays (step, start)."""
     with np.errstate(invalid="ignore"):
-        return np.where(counts, values, 0.0).sum(axis=0) / counts.sum(axis=0)
+        off, off_grounded = (np.abs(walk_margin(feet) - wanted) for feet in (measured, near))
+        steps = {  # values, and the steps that count, both (step, start)
+            "margin": (off, touching),
+            "margin_grounded": (off_grounded, touching),
+            "margin_pressure": (np.abs(pressure - wanted), compared & np.isfinite(pressure)),
+            "margin_same_feet": (off, touching & same),
+            "same_feet": (same, compared),
+            "same_feet_grounded": (same_near, compared),
+            "drift": (drift, compared),
+        }
+        return {
+            name: np.where(counts, values, 0.0).sum(axis=0) / counts.sum(axis=0)
+            for name, (values, counts) in steps.items()
+        }
 
 
 def static_limit_figure(result: "xr.Dataset") -> "Figure":

@@ -6,6 +6,7 @@ distance takes the hindmost foot one stride beyond the longest obstacle.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -17,11 +18,10 @@ from hexmj.measures.cells import outcome_table
 from hexmj.measures.figures import caption_of_at_least
 from hexmj.measures.tables import VELOCITY, reach
 from hexmj.plotting import LEGEND, SERIES, frequency_curve, head, picture, tidy
-from hexmj.starts import checked_list
 from hexmj.stats import wilson_intervals
 from hexmj.studies.base import Study
 from hexmj.sweep import Cell, over_axes
-from hexmj.timing import Stride, steps_within
+from hexmj.timing import steps_within
 from hexmj.validate import distinct
 
 if TYPE_CHECKING:
@@ -68,7 +68,6 @@ class Terrain(Study):
     grasps: Sequence[float] = (0.0, 1.0)
     """Adhesion of a standing foot, in multiples of the insect's weight."""
     n_starts: int = field(default=30, kw_only=True)
-    """Number of random starts, the same for every obstacle."""
     conditions: Conditions = field(default=FARTHER, kw_only=True)
 
     hidden: ClassVar[tuple[str, ...]] = ("ground", "ground_height", "grasp")
@@ -102,16 +101,12 @@ class Terrain(Study):
 
     def cells(self) -> list[Cell]:
         """Return a cell for each obstacle, grasp and velocity."""
-        before = self.obstacles
-
-        def cell(obstacle: str, grasp: float, velocity: float) -> Cell:
-            name, conditions = f"{obstacle}-grasp-{grasp:g}-V-{velocity:g}", replace(before[obstacle], grasp=grasp)
-            walks = self.walks(velocity, self.distance / velocity, conditions)
-            return Cell(name, outcome_table, {"walks": walks}, 1 / velocity)
-
         self.check_walks(self.velocities, *(replace(self.conditions, grasp=grasp) for grasp in self.grasps))
-        v = checked_list(self.velocities)
-        return [cell(name, grasp, velocity) for name in before for grasp in self.grasps for velocity in v]
+        cells = []
+        for (obstacle, conditions), grasp, v in product(self.obstacles.items(), self.grasps, self.observed[0]):
+            walks = self.walks(v, self.distance / v, replace(conditions, grasp=grasp))
+            cells.append(Cell(f"{obstacle}-grasp-{grasp:g}-V-{v:g}", outcome_table, {"walks": walks}, 1 / v))
+        return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return what happened to the starts.
@@ -123,8 +118,25 @@ class Terrain(Study):
             beyond the obstacle. Over start too: `OUTCOMES`, the `distance` walked [mm], and `after`, whether the start
             fell after it had reached the obstacle.
         """
-        (ahead, behind), at = reach(self.stride), self.conditions.ground_at
-        table = with_crossings(self._over_obstacles(data), self.distance, self.stride, at - ahead, behind)
+        table = self._over_obstacles(data)
+        time = steps_within(self.distance / table.velocity.values, self.stride) * self.stride.dt
+        commanded = np.minimum(table.fall, table.velocity.copy(data=time)) * table.velocity
+        walked = (table.speed * commanded).assign_attrs(units="mm", long_name="distance walked by O")
+        ahead, behind = reach(self.stride)
+        upright, reaching = np.isinf(table.fall), commanded > self.conditions.ground_at - ahead
+        after, unit = reaching & ~upright, {"units": "1"}
+        reached, fell = reaching.sum("start"), after.sum("start")
+        low, high = wilson_intervals(fell.values, reached.values)
+        crossed = (upright & (walked > table.end + behind)).sum("start")
+        table = table.assign(
+            distance=walked,
+            after=after.assign_attrs(unit, long_name="fell after it had reached the obstacle"),
+            reached=reached.assign_attrs(unit, long_name="starts that reached the obstacle"),
+            crossed=crossed.assign_attrs(unit, long_name="starts that crossed it without a fall"),
+            flss=(fell / reached.where(reached > 0)).assign_attrs(unit, long_name="FLSS from there on"),
+            flss_low=(fell.dims, low, unit),
+            flss_high=(fell.dims, high, unit),
+        )
         return self.labelled(table, "terrain", observation_time=f"{self.distance:g} / V", distance=self.distance)
 
     def _over_obstacles(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
@@ -139,7 +151,7 @@ class Terrain(Study):
             size=("obstacle", [_size(conditions) for conditions in before.values()], {"units": "mm"}),
             end=("obstacle", end, {"units": "mm", "long_name": "where the obstacle ends or has been climbed"}),
             grasp=("grasp", list(self.grasps), grasp),
-            velocity=("velocity", checked_list(self.velocities), VELOCITY),
+            velocity=("velocity", self.observed[0], VELOCITY),
         )
         for name, (units, long_name) in OUTCOMES.items():
             table[name].attrs = {"units": units, "long_name": long_name}
@@ -154,38 +166,6 @@ def _end(conditions: Conditions) -> float:
 def _size(conditions: Conditions) -> float:
     """Return the length of a gap or the height of another obstacle [mm]; 0 for flat ground."""
     return {"flat": 0.0, "gap": conditions.ground_length}.get(conditions.ground, conditions.ground_height)
-
-
-def with_crossings(data: "xr.Dataset", distance: float, stride: Stride, begin: float, behind: float) -> "xr.Dataset":
-    """Add the FLSS of the starts that reach an obstacle, and the other variables of `Terrain.result`.
-
-    Args:
-        data: over (obstacle, grasp, velocity, start).
-        distance: commanded, in whole steps [mm].
-        stride: of these steps.
-        begin: commanded distance at which a front foot may reach the obstacle [mm].
-        behind: how far behind O a hind foot may stand [mm].
-    """
-    import xarray as xr
-
-    time = steps_within(distance / data.velocity.values, stride) * stride.dt
-    commanded = np.minimum(data.fall, data.velocity.copy(data=time)) * data.velocity
-    walked = (data.speed * commanded).assign_attrs(units="mm", long_name="distance walked by O")
-    upright, reaching = np.isinf(data.fall), commanded > begin
-    after = reaching & ~upright
-    reached, fell = reaching.sum("start"), after.sum("start")
-    low, high = wilson_intervals(fell.values, reached.values)
-    crossed = (upright & (walked > data.end + behind)).sum("start")
-    unit = {"units": "1"}
-    return data.assign(
-        distance=walked,
-        after=after.assign_attrs(unit, long_name="fell after it had reached the obstacle"),
-        reached=reached.assign_attrs(unit, long_name="starts that reached the obstacle"),
-        crossed=crossed.assign_attrs(unit, long_name="starts that crossed it without a fall"),
-        flss=(fell / xr.where(reached > 0, reached, np.nan)).assign_attrs(unit, long_name="FLSS from there on"),
-        flss_low=(fell.dims, low, unit),
-        flss_high=(fell.dims, high, unit),
-    )
 
 
 def terrain_figure(result: "xr.Dataset") -> "Figure":
