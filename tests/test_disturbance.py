@@ -290,7 +290,7 @@ def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["halt", "leg", "push"])
 def test_some_starts_alone_go_as_among_all(kind):
-    walks = StableWalks(LDVS, V, 3, 0, STRIDE, GRID)
+    walks = StableWalks(LDVS, V, 3, 0, STRIDE)
     asked = Case(kind, "none", 5.0 * (kind == "push")), 5.0, None, Conditions()
     every, alone = walks.times(*asked), walks.times(*asked, which=np.array([2, 0]))
     assert alone.identical(every.isel(start=[2, 0]))

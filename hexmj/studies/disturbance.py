@@ -16,7 +16,7 @@ from hexmj.errors import InputError
 from hexmj.io import settings
 from hexmj.measures.figures import caption_of_at_least
 from hexmj.measures.tables import differences, frequency, velocity_axis
-from hexmj.plotting import LEGEND, SERIES, VELOCITY, frequency_curve, head, picture, tidy, velocity_ticks
+from hexmj.plotting import LEGEND, SERIES, flss_axes, frequency_curve, head, picture
 from hexmj.studies.base import Study
 from hexmj.studies.disturbed_walks import GRID, NO_DISTURBANCE, Answer, Case, Kind, StableWalks, Strategy
 from hexmj.sweep import Cell, over_axes
@@ -126,7 +126,7 @@ class DisturbedWalks(Study):
         return cells
 
     def _walks(self, velocity: float) -> StableWalks:
-        return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride, GRID)
+        return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride)
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the times of events, and how often they happen.
@@ -236,11 +236,9 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
         for case in np.flatnonzero((names == kind) & ((strategies != "grasp") | (measure == "physical"))):
             strategy = strategies[case]
             frequency_curve(axes, v + shifts[strategy], data.isel(case=case), measure, **STYLES[strategy])
-        velocity_ticks(axes, v)
-        axes.set(xlim=(v.min() - 0.05, v.max() + 0.05), ylim=(-0.03, 1.03))
-        axes.set(xlabel=VELOCITY, ylabel=f"FLSS, {ROWS[measure]}")
+        flss_axes(axes, v)
+        axes.set_ylabel(f"FLSS, {ROWS[measure]}")
         axes.label_outer()
-        tidy(axes)
     entries = [Line2D([], [], markersize=4, label=name.replace("_", " "), **STYLES[name]) for name in used]
     entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
     least = min(int(data[f"{measure}_reached"].min()) for measure in measures)

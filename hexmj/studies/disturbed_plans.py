@@ -233,22 +233,16 @@ class DisturbedPlan(WrappedPlan):
         tips, standing = self._disturbance.legs(self._plan.tips, self._plan.standing)
         self._tips[which], self._standing[which], self._held[which] = tips[which], standing[which], self._beside[which]
         self.resumed[which] = self.done
-        for start in np.flatnonzero(which & self._stops).tolist():
-            rest = self._rest(tips[start])
-            self._rests[start] = rest
-            self.resumed[start] += len(rest.tips)
-            self._tips[start] = rest.tips[-1]
-            if self._postures:
-                self._standing[start] = self._postures.standing[self._postures.nearest(tips[start])]
-
-    def _rest(self, tips: np.ndarray) -> Rest:
-        """Return the rest of a start that is halted with these tips, (leg,) [mm]."""
         steps = round(PAUSE / self.stride.dt)
-        pause = Rest(np.tile(tips, (steps, 1)), np.ones((steps, 6), dtype=bool))
-        if not self._postures:
-            return pause
-        moves = reorganise(tips, self._postures.tips[self._postures.nearest(tips)], self.stride)
-        return Rest(np.concatenate([pause.tips, moves.tips]), np.concatenate([pause.standing, moves.standing]))
+        for start in np.flatnonzero(which & self._stops).tolist():
+            rest = Rest(np.tile(tips[start], (steps, 1)), np.ones((steps, 6), dtype=bool))
+            if self._postures:
+                nearest = self._postures.nearest(tips[start])
+                moves = reorganise(tips[start], self._postures.tips[nearest], self.stride)
+                rest = Rest(np.concatenate([rest.tips, moves.tips]), np.concatenate([rest.standing, moves.standing]))
+                self._standing[start] = self._postures.standing[nearest]
+            self._rests[start], self._tips[start] = rest, rest.tips[-1]
+            self.resumed[start] += len(rest.tips)
 
     def _resume(self, which: np.ndarray) -> None:
         """Let the plan of these starts, (start,), continue, or begin again after a rest."""

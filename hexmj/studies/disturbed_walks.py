@@ -161,8 +161,6 @@ class StableWalks:
     """Seed of starts, times, legs and postures."""
     stride: Stride
     """Step range, lines of the tips and time step."""
-    grid: int
-    """Steps of which every time of a disturbance is a multiple."""
 
     def __post_init__(self) -> None:
         check_steerable(self.planner)
@@ -176,7 +174,7 @@ class StableWalks:
     @cached_property
     def found(self) -> StableStarts:
         """The starts; found once for all cases."""
-        found = find_stable_starts(self.planner, self.velocity, self.n_starts, self.seed, self.stride, self.grid)
+        found = find_stable_starts(self.planner, self.velocity, self.n_starts, self.seed, self.stride, GRID)
         check_repeats(self.planner, found.starts, self.velocity, REPEATED, self.stride)
         return found
 

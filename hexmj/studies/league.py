@@ -109,11 +109,8 @@ class League(Study):
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return what tables, figures and ranks are made of, see `standings.standings`."""
-        names = ("velocities", "trial_velocity", "accelerating", "periods")
-        own = {name: getattr(self, name) for name in names} | {
-            "physical_starts": min(self.physical_starts, self.n_starts),
-            "trial_starts": min(self.trial_starts, self.n_starts),
-        }
+        own = {name: getattr(self, name) for name in ("velocities", "trial_velocity", "accelerating", "periods")}
+        own |= {name: min(getattr(self, name), self.n_starts) for name in ("physical_starts", "trial_starts")}
         found = dict(zip(self.named_cells(), data, strict=True))
         return self.labelled(standings(self.controllers, self.observed[0], found), "league", **own)
 

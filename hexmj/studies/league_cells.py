@@ -23,7 +23,7 @@ from hexmj.measures.kinematic import first_loss
 from hexmj.measures.tables import happened, over_start
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean
 from hexmj.starts import draw_starts
-from hexmj.studies.disturbed_walks import GRID, Case, StableWalks, TooFewStable
+from hexmj.studies.disturbed_walks import Case, StableWalks, TooFewStable
 from hexmj.timing import Acceleration, Stride, observation_duration, steps_within
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ class EntrantWalks:
 
         NaN if too few starts are stable until the disturbance, the insect fell before it, or the walk fails.
         """
-        stable = StableWalks(self.entrant.controller, self.velocity, self.n_starts, self.seed, self.stride, GRID)
+        stable = StableWalks(self.entrant.controller, self.velocity, self.n_starts, self.seed, self.stride)
         how = case, self.duration, None, conditions, threads
         try:
             times = unless_refused(lambda which: stable.times(*how, which)[[*DISTURBED]], self.n_starts, DISTURBED)

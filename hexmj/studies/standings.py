@@ -214,8 +214,8 @@ def from_one(result: "xr.Dataset") -> str:
 
 def frequency(one: "xr.Dataset", name: str) -> str:
     """Return a frequency with its interval; "-" if it is unknown."""
-    middle, low, high = (one[name + end].item() for end in ("", "_low", "_high"))
-    return "-" if np.isnan(middle) else f"{_short(middle)} ({_short(low)}-{_short(high)})"
+    middle, low, high = (_short(one[name + end].item()) for end in ("", "_low", "_high"))
+    return "-" if middle == "nan" else f"{middle} ({low}-{high})"
 
 
 def _rows(shown: "xr.Dataset", row: Callable[["xr.Dataset"], Iterable[str]]) -> list[tuple[str, ...]]:

@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 ObstacleKind = Literal["step", "gap", "hurdle", "rough"]
 """Kinds of ground that are not flat, see `Conditions.ground`."""
 
-OUTCOMES = {  # units, long_name
-    "fall": ("time unit", "first contact of the trunk with the ground, or inf"),
-    "fall_part": ("1", "index of the part that touched first, -1 for none"),
-    "tilt": ("rad", "greatest tilt of the trunk"),
-    "speed": ("1", "distance walked ahead over distance commanded, until the fall"),
+OUTCOMES = {
+    "fall": "first contact of the trunk with the ground, or inf",
+    "fall_part": "index of the part that touched first, -1 for none",
+    "tilt": "greatest tilt of the trunk",
+    "speed": "distance walked ahead over distance commanded, until the fall",
 }
-"""Fields of `physics.outcomes.Outcomes` in the result."""
+"""Field of `physics.outcomes.Outcomes` in the result -> long name."""
 
 FARTHER = Conditions(ground_at=80.0)
 """Default conditions: walks have found their gait before they reach an obstacle."""
@@ -153,9 +153,7 @@ class Terrain(Study):
             grasp=("grasp", list(self.grasps), grasp),
             velocity=("velocity", self.observed[0], VELOCITY),
         )
-        for name, (units, long_name) in OUTCOMES.items():
-            table[name].attrs = {"units": units, "long_name": long_name}
-        return table
+        return table.assign({name: table[name].assign_attrs(long_name=text) for name, text in OUTCOMES.items()})
 
 
 def _end(conditions: Conditions) -> float:
