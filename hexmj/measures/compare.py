@@ -12,16 +12,8 @@ from hexmj.controllers.planning import check_velocities
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.io import attributes
 from hexmj.legs import LEGS
+from hexmj.measures import tables
 from hexmj.measures.cells import WalkSettings, outcome_table
-from hexmj.measures.tables import (
-    frequency,
-    frequency_table,
-    happened,
-    losses_by_sample,
-    observed,
-    settings,
-    velocity_axis,
-)
 from hexmj.starts import check_draw, draw_starts
 from hexmj.sweep import Cell, Execution, over_axes, run_study
 from hexmj.timing import Acceleration, Stride
@@ -73,7 +65,7 @@ class Comparison:
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
         """Velocities and observation times [time units], both (velocity,)."""
-        return observed(self.velocities, self.observation_time, self.stride, self.acceleration)
+        return tables.observed(self.velocities, self.observation_time, self.stride, self.acceleration)
 
     def cells(self) -> list[Cell]:
         """Return the cells, each an `outcome_table`."""
@@ -90,7 +82,7 @@ class Comparison:
         """Return the table of `compare`."""
         starts = draw_starts(self.n_starts, self.seed, self.stride)
         table = over_axes({"controller": len(self.controllers), "velocity": len(self.velocities)}, data).assign_coords(
-            **velocity_axis(*self.observed),
+            **tables.velocity_axis(*self.observed),
             controller=list(self.controllers),
             leg=list(LEGS),
             starts=(("start", "leg"), starts, {"units": "mm", "long_name": "tips at the start"}),
@@ -101,7 +93,11 @@ class Comparison:
         for name, case in zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True):
             table[name] = case.sum("start").assign_attrs(units="1", long_name="number of starts")
         walks = self.observation_time, self.n_starts, self.seed, self.stride, self.acceleration
-        made = {"study": "compare"} | settings(self.controllers, *walks) | {"conditions": self.conditions.settings()}
+        made = (
+            {"study": "compare"}
+            | tables.settings(self.controllers, *walks)
+            | {"conditions": self.conditions.settings()}
+        )
         return table.assign_attrs(attributes(made))
 
 
@@ -162,8 +158,8 @@ def physical_flss(
         InputError, SimulationError: as `compare`.
     """
     result = compare(controller, velocities, n_starts=n_starts, **options)
-    fell = losses_by_sample(np.isfinite(result.fall.values[0]))
-    table = frequency_table(fell, result.sizes["start"], result.velocity.values, result.duration.values)
+    fell = tables.losses_by_sample(np.isfinite(result.fall.values[0]))
+    table = tables.frequency_table(fell, result.sizes["start"], result.velocity.values, result.duration.values)
     wanted = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
     reported = result.isel(controller=0, drop=True)[[*wanted, "fall", *BESIDE.values(), *REPORTED]]
     return table.assign(reported.drop_vars("duration").data_vars).assign_attrs(result.attrs | {"study": "flss"})
@@ -173,8 +169,8 @@ def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr
     """Add the FLSS of measures, with 95 % Wilson intervals, and `agreement` to outcomes over (..., start)."""
     new: dict[str, Any] = {}
     for measure, outcome in measures.items():
-        lost = happened(data[outcome]).transpose(..., "start")
-        new |= frequency(measure, lost.values, tuple(map(str, lost.dims[:-1])))
+        lost = tables.happened(data[outcome]).transpose(..., "start")
+        new |= tables.frequency(measure, lost.values, tuple(map(str, lost.dims[:-1])))
         new[measure][2]["long_name"] = f"{measure} FLSS"
     same = (data.planned_loss < np.inf) == (data.fall < np.inf)
     new["agreement"] = same.mean("start").assign_attrs(units="1", long_name="kinematic and physical answer agree")

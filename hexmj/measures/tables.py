@@ -124,12 +124,8 @@ def happened(time: "xr.DataArray") -> "xr.DataArray":
 
 def padded(rows: Sequence[Sequence[Any]]) -> np.ndarray:
     """Return events of each start, 0 or 1, as one array (row, column, start), with NaN for missing starts."""
-    cells = [[np.asarray(cell, dtype=float) for cell in row] for row in rows]
-    array = np.full((len(cells), len(cells[0]), max(len(cell) for row in cells for cell in row)), np.nan)
-    for i, row in enumerate(cells):
-        for j, cell in enumerate(row):
-            array[i, j, : len(cell)] = cell
-    return array
+    most = max(len(cell) for row in rows for cell in row)
+    return np.array([[[*map(float, cell), *[np.nan] * (most - len(cell))] for cell in row] for row in rows])
 
 
 def frequency(name: str, events: np.ndarray, dims: Dims) -> dict[str, Any]:
