@@ -11,7 +11,7 @@ from hexmj.paper.measurements import footfalls, limit_regimes, losses, losses_af
 from hexmj.starts import MOST_STARTS, SAMPLE, checked_list
 from hexmj.sweep import Cell
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
-from hexmj.validate import choice, whole
+from hexmj.validate import whole
 
 OWN = {variant: name for name, variant in MODEL_VARIANTS.items() if name != "printed"}
 """Model variants under which our own presets were searched -> beginning of their names, instead of 'own'."""
@@ -164,12 +164,8 @@ MEASUREMENTS: dict[str, Measurement] = {
 
 
 def cells(name: str, protocol: Protocol) -> dict[float, Cell]:
-    """Return the cells of a measurement by velocity.
-
-    Raises:
-        InputError: no such measurement.
-    """
-    measurement = MEASUREMENTS[choice("measurement", name, MEASUREMENTS)]
+    """Return the cells of a measurement by velocity."""
+    measurement = MEASUREMENTS[name]
     velocities: tuple[float, ...] = getattr(protocol, measurement.at)
     work = measurement.seconds / len(velocities)
 

@@ -104,10 +104,8 @@ def run_search(
     effort = effort.completed(physical=problem.conditions is not None)
     earlier = _earlier_seeds(problem, effort)
     if effort.verdict_seed in {effort.seed, *earlier}:
-        raise InputError(
-            f"verdict_seed = {effort.verdict_seed} is the seed of this search or of the one that found its beginning;"
-            " expected another, for fresh starts"
-        )
+        searches = "this search and those that found its beginning"
+        raise InputError(f"verdict_seed = {effort.verdict_seed}; expected another seed than those of {searches}")
     begins = [Path(name).resolve() for name in (effort.begin, problem.form.name) if isinstance(name, str)]
     if (Path(out) / FOUND).resolve() in begins:
         raise InputError(f"out = {out}: the search begins with {FOUND} there; expected another directory")
