@@ -169,23 +169,20 @@ def heat_map(
 
     Args:
         axes: to draw in.
-        values: (row, column), the first row at the top; NaN has no colour.
+        values: (row, column); NaN has no colour.
         texts: (row, column).
-        faint: where the text is grey, (row, column); elsewhere it is bold. By default all texts are black.
+        faint: where the text is grey on light colours, (row, column); elsewhere it is bold. By default all are plain.
         style: options of `Axes.imshow`.
     """
     image = axes.imshow(values, aspect="auto", **style)
-    dark = image.to_rgba(values)[..., :3] @ [0.3, 0.59, 0.11] < 0.5
+    shade = image.to_rgba(values)[..., :3] @ [0.3, 0.59, 0.11]
     for row, column in np.argwhere(texts != ""):
-        grey = faint is not None and faint[row, column]
-        white = dark[row, column] and np.isfinite(values[row, column])
-        shown: dict[str, Any] = {
-            "color": "white" if white else "0.4" if grey else "0.1",
-            "ha": "center",
-            "va": "center",
-        }
-        weight = "normal" if faint is None or grey else "bold"
-        axes.text(column, row, str(texts[row, column]), **shown, fontweight=weight, fontsize=8, linespacing=1.1)
+        weak, light = faint is not None and faint[row, column], shade[row, column]
+        white = light < 0.5 and np.isfinite(values[row, column])
+        colour = "white" if white else "0.4" if weak and light > 0.85 else "0.1"
+        weight = "normal" if faint is None or weak else "bold"
+        middle: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "linespacing": 1.1}
+        axes.text(column, row, str(texts[row, column]), color=colour, fontweight=weight, **middle)
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
     return image

@@ -18,7 +18,7 @@ from hexmj.studies.base import Study
 from hexmj.studies.league import REGIMES
 from hexmj.studies.league_cells import Entrant, EntrantWalks, short_names
 from hexmj.sweep import Cell
-from hexmj.validate import whole
+from hexmj.validate import distinct, whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,9 +88,7 @@ class Ablation(Study):
         super().__post_init__()
         whole("physical_starts", self.physical_starts, 1)
         whole("periods", self.periods, CYCLES + 2)
-        names = [name for several in self.controllers.values() for name in several]
-        if not names or len({*names}) < len(names):
-            raise InputError(f"controllers = {names}; expected one or more, each once")
+        distinct("controllers", [name for several in self.controllers.values() for name in several])
         if not (self.observed[0] > 0).all():
             raise InputError(f"velocities = {self.velocities}; expected each above 0")
 

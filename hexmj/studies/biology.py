@@ -220,9 +220,8 @@ class Biology(Study):
             "verdict": [row.verdict(mean) for row, (mean, _, _) in zip(ANIMALS, ours, strict=True)],
             "walked": [np.count_nonzero(np.isfinite(starts)) for starts in values],
         }
-        measured = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row")
-        units = dict.fromkeys(columns, "1") | {"at": "mm/s"} | measured
-        rows = {name: ("row", column, {"units": units[name]}) for name, column in columns.items()}
+        units = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row") | {"at": "mm/s"}
+        rows = {name: ("row", column, {"units": units.get(name, "1")}) for name, column in columns.items()}
         own = {"observation_time": f"{self.periods} periods", "periods": self.periods, "speeds": list(SPEEDS)}
         return self.labelled(table.assign(rows), "biology", **own)
 

@@ -16,7 +16,7 @@ from hexmj.studies.league_cells import Entrant, EntrantWalks
 from hexmj.studies.standings import LEGS_LOST, TRIALS, standings
 from hexmj.sweep import Cell
 from hexmj.timing import Acceleration, observation_duration
-from hexmj.validate import whole
+from hexmj.validate import distinct, whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,8 +81,7 @@ class League(Study):
         whole("physical_starts", self.physical_starts, 1)
         whole("trial_starts", self.trial_starts, 1)
         whole("periods", self.periods, CYCLES + 2)
-        if not self.controllers:
-            raise InputError("controllers = {}; expected at least one")
+        distinct("controllers", [*self.controllers])
         if not (0 < self.trial_velocity < 1 and (self.observed[0] > 0).all()):
             v = [*self.velocities, self.trial_velocity]
             raise InputError(f"velocities = {v}; expected each above 0 and below 1")
@@ -134,8 +133,8 @@ class League(Study):
         low, high = RANGE
         yield "range", cell("range", "losses_over_range", low, every, 600 * KINEMATIC, low=low, high=high)
         if self.accelerating:
-            cost = 10_000 * KINEMATIC
-            yield "accelerated", cell("accelerated", "losses", FINAL, every, cost, acceleration=Acceleration())
+            cost, own = 10_000 * KINEMATIC, {"acceleration": Acceleration()}
+            yield "accelerated", cell("accelerated", "losses", FINAL, every, cost, **own)
         v, few = self.trial_velocity, min(self.trial_starts, self.n_starts)
         for trial, leg in LEGS_LOST.items():
             walks = cell(f"kinematic-{trial}", "losses", v, every, 200 * KINEMATIC, leg_lost=leg)
@@ -148,15 +147,13 @@ class League(Study):
         from hexmj.physics.pushes import can_push
 
         time = float(observation_duration(self.observation_time, self.trial_velocity, self.stride))
+        pushes = can_push(self.conditions, self.stride, time)
+        reaches = self.trial_velocity * time >= crossed(self.conditions)
         for trial in TRIALS:
-            case = DISTURBED.get(trial)
-            if case and case.kind == "push" and not can_push(self.conditions, self.stride, time):
-                continue
-            if case and entrant.steerable:
-                yield trial, "disturbed", 300, {"case": case, "conditions": self.conditions}
-            elif case or (trial in GROUNDS and self.trial_velocity * time < crossed(self.conditions)):
-                continue
-            elif walking := self.walking(trial, entrant):
+            if case := DISTURBED.get(trial):
+                if entrant.steerable and (pushes or trial != "push"):
+                    yield trial, "disturbed", 300, {"case": case, "conditions": self.conditions}
+            elif (reaches or trial not in GROUNDS) and (walking := self.walking(trial, entrant)):
                 yield trial, "outcomes", 180, walking
 
     def walking(self, trial: str, entrant: Entrant) -> dict[str, Any] | None:

@@ -260,10 +260,9 @@ def _forces(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
 def _torques(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     """Return the torques of the servos while their leg stands, and the work that they do then."""
     torque = strides.torques.reshape(len(strides.torques), 6, -1)
-    power = (strides.torques * strides.turning).reshape(torque.shape)
     if torque.shape[2] != len(JOINTS):
         return {}
-    stands = strides.standing[..., None]
+    power, stands = torque * strides.turning.reshape(torque.shape), strides.standing[..., None]
     with np.errstate(invalid="ignore"):  # of a leg that never stands
         mean = np.abs(torque).sum(axis=0, where=stands) / stands.sum(axis=0)
     against = ((power < 0) & stands).sum(axis=(0, 1)) / strides.standing.sum()

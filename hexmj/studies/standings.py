@@ -64,7 +64,7 @@ def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Dat
     """
     import xarray as xr
 
-    names = list(entrants)
+    names, lost = list(entrants), attrgetter("lost")
 
     def cells(questions: Iterable[str]) -> Cells:
         return [[data.get((name, question)) for question in questions] for name in names]
@@ -77,7 +77,6 @@ def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Dat
         cells([f"{kind} {v}" for v in velocities.tolist()]) for kind in ("kinematic", "physics", "gait")
     )
     upright = [[None if cell is None else _upright(cell) for cell in row] for row in walked]
-    lost = attrgetter("lost")
     measures = {
         "kinematic": events(planned, lost),
         "measured": events(walked, lambda cell: happened(cell.measured_loss)),

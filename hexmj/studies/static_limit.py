@@ -17,7 +17,7 @@ from hexmj.measures.cells import WalkSettings
 from hexmj.measures.compare import with_flss
 from hexmj.measures.figures import caption
 from hexmj.measures.tables import over_start
-from hexmj.plotting import MEASURE_STYLES, frequency_curve, head, picture, tidy
+from hexmj.plotting import LEGEND, MEASURE_STYLES, frequency_curve, head, picture, tidy
 from hexmj.stability import loss_time, walk_margin
 from hexmj.studies.base import Study
 from hexmj.sweep import Cell, over_axes
@@ -85,13 +85,7 @@ PANELS = {
 }
 """Label of a panel's axis -> its variables with their names in the legend."""
 
-ABOVE: dict[str, Any] = {
-    "loc": "lower left",
-    "bbox_to_anchor": (0.0, 1.0),
-    "frameon": False,
-    "fontsize": 8,
-    "ncols": 2,
-}
+ABOVE = LEGEND | {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "fontsize": 8, "ncols": 2}
 """Places a legend above its panel."""
 
 
@@ -153,9 +147,8 @@ class StaticLimit(Study):
         )
         lost = table.planned_loss < np.inf
         for measure in ("measured", "grounded"):
-            same = (table[LOSSES[measure]] < np.inf) == lost
-            attrs = {"units": "1", "long_name": f"kinematic and {measure} answer agree"}
-            table[f"agreement_{measure}"] = same.mean("start").assign_attrs(attrs)
+            same, text = (table[LOSSES[measure]] < np.inf) == lost, f"kinematic and {measure} answer agree"
+            table[f"agreement_{measure}"] = same.mean("start").assign_attrs(units="1", long_name=text)
         own = {"velocity": self.velocity, "duration": self.observed[1].item()}
         return self.labelled(with_flss(table, LOSSES), "converge", **own)
 
