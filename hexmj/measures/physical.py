@@ -1,5 +1,6 @@
 """Physical walks from start to end: `physical_walk` keeps them whole, `physical_outcomes` only how they went."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, WalkSoFar
 from hexmj.physics.pushes import Push
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, settle
-from hexmj.progress import Progress, shown
+from hexmj.progress import Progress, progress_bar
 from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.walks import PlannedWalk, Walk, copied, extent, footfall_html, joined, part_of
 
@@ -90,7 +91,7 @@ def physical_walk(
     planned = advanced(kinematic, int(steps_within(duration, stride)))
     settled = settle(starts, conditions, stride, threads)
     plan = begin(controller, settled.starts, velocity, stride, acceleration, threads=1)
-    with shown(progress, "walking") as advance:
+    with progress_bar("walking") if progress is True else nullcontext(progress or None) as advance:
         return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=advance)
 
 
