@@ -1,9 +1,13 @@
 """Fixtures that all tests share."""
 
+import signal
 import sys
 from collections.abc import Callable
 
 import pytest
+
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # in a background job, whose children would ignore Ctrl-C too
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 from hexmj.rendering import use_egl_without_display
 
