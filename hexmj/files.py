@@ -43,11 +43,17 @@ def write_netcdf(data: "xr.Dataset", path: Path | str) -> Path:
     Raises:
         InputError: an attribute or variable that NetCDF cannot hold.
     """
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
     plain = data.drop_encoding()
-    encoding = {name: {"_FillValue": None} for name in plain.variables}
+    for variable in plain.variables.values():
+        variable.encoding["_FillValue"] = None
+    no_lock: Any = False
     with replacing(path) as part:
         try:
-            plain.to_netcdf(part, engine="h5netcdf", encoding=encoding)
+            with h5netcdf.File(part, "w") as file:  # `to_netcdf` would ask a Dask cluster for a lock
+                plain.dump_to_store(H5NetCDFStore(file, lock=no_lock))
         except (TypeError, ValueError) as error:
             raise InputError(f"{path}: NetCDF cannot hold this dataset: {error}") from None
     return Path(path)

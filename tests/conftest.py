@@ -2,7 +2,8 @@
 
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from tempfile import gettempdir
 
 import pytest
 
@@ -12,6 +13,17 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # in a background job, wh
 from hexmj.rendering import use_egl_without_display
 
 use_egl_without_display()  # before a test imports MuJoCo
+
+
+@pytest.fixture(autouse=True)
+def forget_user_modules() -> Iterator[None]:
+    """Forget the modules that a test loads from its temporary directory."""
+    modules, path = set(sys.modules), list(sys.path)
+    yield
+    for name in set(sys.modules) - modules:
+        if str(getattr(sys.modules[name], "__file__", None)).startswith(gettempdir()):
+            del sys.modules[name]
+    sys.path[:] = path
 
 
 @pytest.fixture
