@@ -145,7 +145,7 @@ BAD = [
     "render nowhere.nc --beside planned",
     "render --width 321",
     "render --format gif --fps 60",
-    "render --beside nobody",
+    "render --beside no-such-controller",
     "page",
     "page taken",
     "view nowhere.nc",

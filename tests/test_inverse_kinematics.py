@@ -83,6 +83,23 @@ def test_unreachable_tips_are_flagged_and_have_no_angles(legs: ThreeHinges | Hin
     assert np.isnan(joints[~reachable]).all() and np.isfinite(joints[reachable]).all()
 
 
+@pytest.mark.parametrize(("joint", "bound"), [(joint, bound) for joint in range(3) for bound in range(2)])
+def test_joint_ranges_bound_what_is_reachable(
+    closed: ThreeHinges, legs: ThreeHinges | HingeChains, joint: int, bound: int
+):
+    for beyond, within in ((-1e-8, True), (1e-8, False)):
+        joints = closed.joint_range.mean(axis=-1)
+        joints[:, joint] = closed.joint_range[:, joint, bound] + (beyond if bound else -beyond)
+        found, reachable = legs.inverse(closed.forward(joints))
+        assert (reachable == within).all()
+        if within:
+            assert_allclose(found, joints, atol=1e-9)
+
+
+def test_only_legs_that_fit_the_closed_form_have_it(made: Body):
+    assert isinstance(kinematics(plain_model(made), made), HingeChains)
+
+
 def test_mirrored_tips_have_equal_angles(closed: ThreeHinges):
     """To the last bit; the numeric ones' axes are mirrored, their angles are rounded otherwise."""
     tips = ORIGIN + np.random.default_rng(1998).uniform([-20, -3, -12], [10, 3, 5], (1000, 6, 3))

@@ -223,7 +223,7 @@ def test_ranks_are_given_only_where_intervals_separate() -> None:
     best, worst = ranks(np.array([often, rarely, seldom, np.full(200, np.nan)], dtype=float))
     assert best.tolist() == [3, 1, 1, 0]
     assert worst.tolist() == [3, 2, 2, 0]
-    few = np.array([[0.0, 0.0], [1.0, 1.0]])  # two starts separate nobody
+    few = np.array([[0.0, 0.0], [1.0, 1.0]])  # two starts show no difference
     assert [one.tolist() for one in ranks(few)] == [[1, 1], [2, 2]]
 
 

@@ -174,7 +174,7 @@ class EntrantWalks:
             limit, see `EffortSoFar`; the `way` walked ahead [mm]. NaN for walks that fail, see `unless_refused`.
 
         Raises:
-            SimulationError: none of the random starts comes to rest, whoever walks.
+            SimulationError: none of the random starts comes to rest.
         """
         from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar
         from hexmj.physics.rollout import drive
