@@ -289,7 +289,7 @@ def test_a_simulation_that_fails_ends_with_code_1(run, tmp_path):
 
 @pytest.mark.slow
 def test_ctrl_c_ends_with_code_130_and_the_command_resumes(tmp_path):
-    words = ["flss", "--velocity", 0.1, "--starts", 4000, "--range-of", 200, "--out", "out", "--threads", 1]
+    words = ["flss", "--velocity", 0.1, "--starts", 40000, "--range-of", 200, "--out", "out", "--threads", 1]
     running = start_process(words, tmp_path)
     until = time.monotonic() + 60
     while not (cells := [*tmp_path.glob("out/walks/ldvs*.nc")]) and time.monotonic() < until:
@@ -302,7 +302,7 @@ def test_ctrl_c_ends_with_code_130_and_the_command_resumes(tmp_path):
     again = start_process([*words, "--json"], tmp_path)
     answer = json.loads(again.communicate(timeout=60)[0])
     assert then == {path: path.stat().st_mtime_ns for path in cells}
-    assert answer["flss"] == hexmj.flss(hexmj.LDVS, [0.1], n_starts=4000).flss.values.tolist()
+    assert answer["flss"] == hexmj.flss(hexmj.LDVS, [0.1], n_starts=40000).flss.values.tolist()
 
 
 def test_output_may_be_cut_off(tmp_path):
