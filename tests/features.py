@@ -19,6 +19,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout, suppress
 from dataclasses import replace
 from functools import cache
 from importlib.util import find_spec
+from inspect import ismodule
 from io import StringIO
 from pathlib import Path
 from runpy import run_path
@@ -359,7 +360,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "doctor": lambda: {check["name"]: True for check in json.loads(run_command("doctor --json")[1])["checks"]},
     "errors": lambda: [text("flss --velocity 1.5"), text("walk --controller nothing")],
     "process": lambda: [process("--help"), process("--version"), process(f"{FLSS} 0.5 --json")],
-    "python names": lambda: {name: getattr(hexmj, name) is not None for name in hexmj.__all__},
+    "python names": lambda: {name: True for name in dir(hexmj) if not ismodule(getattr(hexmj, name))},
     "python measures": measures,
     "python results": results,
     "python own body": own_body,

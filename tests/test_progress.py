@@ -38,20 +38,20 @@ def test_a_bar_changes_no_result_and_progress_adds_up_to_one(name: str, monkeypa
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setenv("TERM", "xterm")
     with_bar, with_function, without = (CALLS[name](progress=how) for how in (True, parts.append, False))
-    assert "━" in screen.text and max(map(len, screen.text.split("\r"))) < 400
+    assert "0 %" in screen.text and "left" in screen.text
     assert sum(parts) == pytest.approx(1.0)
     np.testing.assert_array_equal(with_bar, with_function)
     np.testing.assert_array_equal(with_bar, without)
 
 
-def test_without_a_terminal_lines_are_printed_now_and_then(monkeypatch, capsys):
+def test_without_a_terminal_the_state_is_printed_now_and_then(monkeypatch, capsys):
     monkeypatch.setattr(progress, "EVERY", 0.02)
     with progress.progress_bar("walking") as advance:
         for _ in range(10):
             advance(0.1)
             __import__("time").sleep(0.01)
-    lines = capsys.readouterr().err.splitlines()
-    assert 1 <= len(lines) <= 10 and all(line.startswith("walking: ") and len(line) <= 80 for line in lines)
+    states = capsys.readouterr().err.split("\r")
+    assert 1 <= sum("walking: " in state for state in states) <= 10 and "left" in states[1]
 
 
 def test_work_that_ends_at_once_prints_nothing(capsys):

@@ -83,7 +83,7 @@ def test_nothing_that_can_be_shown_is_no_error():
 
 def documented() -> Iterator[tuple[str, Any, str]]:
     """Every exported name with its object and all docstrings of it: of its methods and fields, too."""
-    for name in hexmj.__all__:
+    for name in dir(hexmj):
         thing = getattr(hexmj, name)
         if inspect.isclass(thing) or inspect.isfunction(thing):
             tree = ast.parse(inspect.getsource(thing))
