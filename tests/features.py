@@ -310,7 +310,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "flss threads": lambda: same_with("--threads 1", f"{FLSS} 0.5"),
     "flss processes": lambda: same_with("--processes 2", f"{FLSS} 0.3 0.6"),
     "flss scheduler": lambda: scheduler(f"{FLSS} 0.3 0.5"),
-    "flss progress bar": lambda: {"bar": "━" in run_command(f"{FLSS} 0.5", terminal=True)[2]},
+    "flss progress bar": lambda: {"bar": " left" in run_command(f"{FLSS} 0.5", terminal=True)[2]},
     "controller presets": lambda: kinematic("hws", "ldvs", "uncoordinated", "own", "own-0.1", "robust-0.3", "lasting"),
     "controller rivals": lambda: kinematic("wilson", "graham", "walknet", "walknet-reacog", "walknet-load"),
     "controller more rivals": lambda: kinematic("cpg-tripod", "cpg-tetrapod", "cpg-wave", "flygym-rules", "righetti"),

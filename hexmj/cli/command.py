@@ -1,7 +1,8 @@
-"""Base of the commands: options, help with examples, running a study, and the line of settings under every answer."""
+"""Base of the commands: options, help with examples, running a study, and the answer with its manifest."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from importlib import import_module
 from itertools import count
 from pathlib import Path
@@ -16,6 +17,22 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from hexmj.sweep import Study
+
+
+@dataclass
+class Answer:
+    """What a command prints: a JSON object, or tables and lines; and what its manifest records."""
+
+    json: Mapping[str, Any]
+    lines: Iterable[Any]
+    files: list[Path] = field(default_factory=list)
+    """Files that the command wrote."""
+    settings: Mapping[str, Any] | None = None
+    """Settings for the manifest; None writes no manifest."""
+    manifest: str = "manifest.json"
+    """Name of the manifest in the folder of --out."""
+    result: "xr.Dataset | None" = None
+    """Result whose settings are recorded and stand under the lines, with a warning if starts were searched on."""
 
 
 class Command:
@@ -55,9 +72,28 @@ class Command:
             raise
         return SimpleNamespace(**vars(flat(parsed)), command=[name, *words])
 
-    def run(self, given: SimpleNamespace) -> None:
-        """Run the command with its options by name."""
+    def run(self, given: SimpleNamespace) -> Answer | None:
+        """Run the command with its options by name, and return the answer unless it has been printed."""
         raise NotImplementedError
+
+    def execute(self, given: SimpleNamespace) -> None:
+        """Run the command, write the manifest, and print the answer."""
+        from hexmj.io import save_manifest, settings
+
+        if (answer := self.run(given)) is None:
+            return
+        files, made = answer.files, answer.settings
+        json, lines = dict(answer.json), [*answer.lines]
+        if answer.result is not None:
+            made = settings(answer.result)
+            found = searched(given)
+            json, lines = {"settings": made} | json | {"searched": found}, [*lines, settings_line(given, answer.result)]
+        if made is not None and given.out:
+            files.append(save_manifest(given.command, made, files, given.out / answer.manifest))
+        if given.json:
+            print_json(json | {"files": files})
+        else:
+            show(*lines, *map(str, files))
 
 
 class StudyCommand(Command):
@@ -95,9 +131,9 @@ class StudyCommand(Command):
         """Write other files, and return their paths."""
         return []
 
-    def run(self, given: SimpleNamespace) -> None:
-        """Run the study in the results' folder, write the files, and print."""
-        from hexmj.io import results_folder, save, save_manifest, settings
+    def run(self, given: SimpleNamespace) -> Answer:
+        """Run the study in the results' folder and write the files."""
+        from hexmj.io import results_folder, save
         from hexmj.sweep import run_study
 
         study, folder = self.build(given), results_folder(given.out)
@@ -107,12 +143,8 @@ class StudyCommand(Command):
         for name, which in self.figures.items():
             files.append(draw(result, folder / f"{name.format(**vars(given))}.{given.format}", which))
         files += self.others(given, result)
-        manifest = folder / self.manifest.format(**vars(given))
-        files.append(save_manifest(given.command, settings(result), files, manifest))
-        if given.json:
-            print_json(self.summary(result) | {"searched": searched(given), "files": files})
-        else:
-            show(*self.shown(study, result), settings_line(given, result), *map(str, files))
+        manifest = self.manifest.format(**vars(given))
+        return Answer(self.summary(result), self.shown(study, result), files, manifest=manifest, result=result)
 
 
 def imported(place: str) -> Any:

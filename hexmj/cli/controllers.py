@@ -7,10 +7,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from hexmj.cli.command import Command, StudyCommand
+from hexmj.cli.command import Answer, Command, StudyCommand
 from hexmj.cli.measures import PHYSICAL
 from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules, no_effect
-from hexmj.cli.output import interval, print_json, report_checks, show, table, tables_that_fit
+from hexmj.cli.output import interval, report_checks, table, tables_that_fit
 from hexmj.errors import InputError, RenderingError, SimulationError
 from hexmj.timing import Stride
 from hexmj.validate import distinct
@@ -198,17 +198,12 @@ class Search(Command):
     hidden = ("low", "high")
     examples = ("--form hws --velocity 0.5 --budget 200", "--form mine.py:Mine --velocity 0.3 0.6 --algorithm cmaes")
 
-    def run(self, given: SimpleNamespace) -> None:
-        from hexmj.io import MANIFEST, save_manifest
+    def run(self, given: SimpleNamespace) -> Answer:
         from hexmj.search.results import run_search, title
 
         problem, effort = self.settings(given)
         how: Any = {"threads": given.threads, "fresh": given.fresh, "figure": f"convergence.{given.format}"}
         result = run_search(problem, effort, given.out, progress=True, **how)
-        result.files.append(save_manifest(given.command, result.settings, result.files, given.out / MANIFEST))
-        if given.json:
-            print_json(result.summary())
-            return
         rows = zip(problem.form.names, *result.vectors.values(), strict=True)
         numbers = [(name, *(f"{value:.4g}" for value in values)) for name, *values in rows]
         verdict, times = result.verdict, result.verdict.observation_time.values.tolist()
@@ -217,14 +212,14 @@ class Search(Command):
             for name in verdict.controller.values.tolist()
         ]
         effort = result.effort
-        show(
+        lines = [
             title(problem, effort),
             table(("parameter", *result.vectors), numbers),
             f"FLSS on {effort.verdict_starts} fresh starts (seed {effort.verdict_seed}), with 95 % intervals",
             table(("controller", *(f"observation time {time.removesuffix('.0')}" for time in times)), judged),
             *result.found.report(problem),
-            *map(str, result.files),
-        )
+        ]
+        return Answer(result.summary(), lines, result.files, result.settings)
 
     def settings(self, given: SimpleNamespace) -> Any:
         """Return the problem and the effort that the options describe."""

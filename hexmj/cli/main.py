@@ -96,7 +96,7 @@ def run(words: list[str]) -> None:
             _complete(words)
         case [name, *rest] if name in COMMANDS:
             chosen = command(name)
-            chosen.run(chosen.parse(name, rest))
+            chosen.execute(chosen.parse(name, rest))
         case [name, *_]:
             raise InputError(f"{name!r} is no command; `hexmj --help` lists them")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.cli.command import Command, StudyCommand, at_work, draw, searched, settings_line
+from hexmj.cli.command import Answer, Command, StudyCommand, at_work, draw
 from hexmj.cli.options import (
     Figures,
     Output,
@@ -29,9 +29,7 @@ from hexmj.cli.output import (
     four_digits,
     grid,
     intervals,
-    print_json,
     report_line,
-    show,
     table,
 )
 from hexmj.conditions import Conditions
@@ -69,8 +67,8 @@ class Walk(Command):
     sources = (WalkOptions, "replay.recording:Start", Output, Planning, Threads, Figures)
     examples = ("--velocity 0.5", "--controller wilson --physical --seed 7 --json")
 
-    def run(self, given: SimpleNamespace) -> None:
-        from hexmj.io import MANIFEST, attributes, results_folder, save_manifest
+    def run(self, given: SimpleNamespace) -> Answer:
+        from hexmj.io import attributes, results_folder
         from hexmj.replay.recording import Start, recording_summary, save_recording
 
         if not given.physical:
@@ -80,14 +78,10 @@ class Walk(Command):
         walked = start.recorded(given.physical, title, given.threads)
         settings = start.settings(**{given.controller: start.controller}) | {"physical": given.physical}
         files = [save_recording(walked, out / "recording.nc"), draw(walked, out / f"walk.{given.format}")]
-        files.append(save_manifest(given.command, settings, files, out / MANIFEST))
         summary = recording_summary(walked)
-        if given.json:
-            print_json(summary | {"settings": settings, "searched": searched(given), "files": files})
-        else:
-            lines = [f"{key}: {_in_words(key, value)}" for key, value in summary.items() if value is not None]
-            made = walked.drop_vars(walked.variables).assign_attrs(attributes(settings))
-            show(title, *lines, settings_line(given, made), *map(str, files))
+        lines = [f"{key}: {_in_words(key, value)}" for key, value in summary.items() if value is not None]
+        made = walked.drop_vars(walked.variables).assign_attrs(attributes(settings))
+        return Answer(summary | {"settings": settings}, [title, *lines], files, result=made)
 
 
 @dataclass(frozen=True)
@@ -115,8 +109,8 @@ class Flss(Command):
     sources = (FlssOptions, "measures.kinematic:KinematicFlss", Output, Planning, Workers, Figures)
     examples = ("--velocity 0.5", "--physical --velocity 0.3 0.5 --starts 50 --out results/flss")
 
-    def run(self, given: SimpleNamespace) -> None:
-        from hexmj.io import MANIFEST, attributes, results_folder, save, save_manifest, settings
+    def run(self, given: SimpleNamespace) -> Answer:
+        from hexmj.io import attributes, results_folder, save
         from hexmj.measures.compare import physical_report
 
         if not given.physical:
@@ -129,25 +123,17 @@ class Flss(Command):
         files: list[Path] = []
         if given.out:
             files = [save(result, given.out / "flss.nc"), draw(result, given.out / f"flss.{given.format}")]
-            files.append(save_manifest(given.command, settings(result), files, given.out / MANIFEST))
         names = [str(name) for name, values in result.items() if values.dims == ("velocity",)]
         report = physical_report(result) if given.physical else {}
-        if given.json:
-            lists = {name: result[name].values.tolist() for name in ["velocity", *names]}
-            more = {"settings": settings(result), "searched": searched(given), "files": files}
-            print_json(lists | ({"report": report} if report else {}) | more)
-            return
+        lists = {name: result[name].values.tolist() for name in ["velocity", *names]}
         columns = [name for name in names if result[name].notnull().any()]
         rows = [
             (f"{v:g}", *(four_digits(result[name].sel(velocity=v).item()) for name in columns))
             for v in result.velocity.values
         ]
-        lines = [settings_line(given, result), *([report_line(report)] if report else []), *map(str, files)]
-        show(
-            f"{'physical' if given.physical else 'kinematic'} FLSS of {given.controller}",
-            table(("V", *columns), rows),
-            *lines,
-        )
+        lines = [f"{'physical' if given.physical else 'kinematic'} FLSS of {given.controller}"]
+        lines += [table(("V", *columns), rows), *([report_line(report)] if report else [])]
+        return Answer(lists | ({"report": report} if report else {}), lines, files, result=result)
 
     def measured(self, given: SimpleNamespace) -> "xr.Dataset":
         """Return the FLSS over velocities."""

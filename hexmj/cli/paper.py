@@ -4,9 +4,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
-from hexmj.cli.command import Command, at_work
+from hexmj.cli.command import Answer, Command, at_work
 from hexmj.cli.options import Output, Workers, build
-from hexmj.cli.output import print_json, show, table
+from hexmj.cli.output import table
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,7 @@ class Reproduce(Command):
     sources = (ReproduceOptions, "paper.protocol:Reproduction", Output, Workers)
     examples = ("--quick", "--only hws-close p4 --beside lasting --json")
 
-    def run(self, given: SimpleNamespace) -> None:
-        from hexmj.io import MANIFEST, save_manifest
+    def run(self, given: SimpleNamespace) -> Answer:
         from hexmj.paper.protocol import Reproduction
         from hexmj.paper.reproduce import reproduce
         from hexmj.plotting import as_shipped
@@ -34,9 +33,5 @@ class Reproduce(Command):
         with at_work(given, "reproducing") as execution, as_shipped():
             report = reproduce(given.out, chosen.protocol, chosen.only, chosen.beside, **execution)
         settings = {"protocol": asdict(report.protocol), "only": chosen.only, "beside": chosen.beside}
-        report.files.append(save_manifest(given.command, settings, report.files, given.out / MANIFEST))
-        if given.json:
-            print_json(report.json() | {"files": report.files})
-        else:
-            tables = [table(heads, rows) for heads, rows in report.tables()]
-            show("The claims of the 1998 paper", *tables, *report.summary, *map(str, report.files))
+        lines = ["The claims of the 1998 paper", *(table(*parts) for parts in report.tables()), *report.summary]
+        return Answer(report.json(), lines, report.files, settings)

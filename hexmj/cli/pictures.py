@@ -7,10 +7,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
 
-from hexmj.cli.command import Command
+from hexmj.cli.command import Answer, Command
 from hexmj.cli.measures import PHYSICAL
 from hexmj.cli.options import Output, Planning, Threads, build, controller, no_effect
-from hexmj.cli.output import print_json, show
+from hexmj.cli.output import show
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
@@ -50,8 +50,8 @@ class Render(Command):
     positional = "recordings"
     examples = ("results/walk/recording.nc --camera side", "--controller wilson --velocity 0.5 --beside planned")
 
-    def run(self, given: SimpleNamespace) -> None:
-        from hexmj.io import MANIFEST, results_folder, save_manifest
+    def run(self, given: SimpleNamespace) -> Answer:
+        from hexmj.io import MANIFEST, results_folder
         from hexmj.replay.recording import Start, load_recording, recording_summary, save_recording
         from hexmj.replay.video import missing, render
 
@@ -78,13 +78,9 @@ class Render(Command):
             settings |= start.settings(**{given.controller: start.controller}) | {"beside": given.beside}
         video = out / f"{name}.{given.format}"
         frames = render(shown, video, film, progress=True)
-        files.append(video)
-        files.append(save_manifest(given.command, settings, files, out / f"{video.name}-{MANIFEST}"))
-        if given.json:
-            summary = {"frames": frames, "film": asdict(film), "files": files}
-            print_json(summary | {"recordings": [recording_summary(walked) for walked in shown]})
-        else:
-            show(f"{frames} frames at {film.fps:g} per second", *map(str, files))
+        summary = {"frames": frames, "film": asdict(film), "recordings": [*map(recording_summary, shown)]}
+        line = f"{frames} frames at {film.fps:g} per second"
+        return Answer(summary, [line], [*files, video], settings, f"{video.name}-{MANIFEST}")
 
 
 def _recorded(start: "Start", given: SimpleNamespace) -> "list[xr.Dataset]":
@@ -127,22 +123,19 @@ class Page(Command):
     positional = "recordings"
     examples = ("results/walk/recording.nc", "first/recording.nc second/recording.nc --out results/both")
 
-    def run(self, given: SimpleNamespace) -> None:
-        from hexmj.io import MANIFEST, results_folder, save_manifest
+    def run(self, given: SimpleNamespace) -> Answer:
+        from hexmj.io import MANIFEST, results_folder
         from hexmj.replay.page import page
         from hexmj.replay.recording import load_recording, recording_summary
 
         if not 1 <= len(given.recordings) <= 2:
             raise InputError(f"{len(given.recordings)} recordings; expected 1 or 2, such as recording.nc of hexmj walk")
         shown = [load_recording(path) for path in given.recordings]
-        out = results_folder(given.out)
-        files = [page(shown, out / "walk.html")]
+        file = page(shown, results_folder(given.out) / "walk.html")
         settings = {"recordings": [str(path) for path in given.recordings]}
-        files.append(save_manifest(given.command, settings, files, out / f"walk.html-{MANIFEST}"))
-        if given.json:
-            print_json({"files": files, "recordings": [recording_summary(walked) for walked in shown]})
-        else:
-            show(f"{files[0].stat().st_size / 1e6:.1f} MB; opens in any browser", *map(str, files))
+        line = f"{file.stat().st_size / 1e6:.1f} MB; opens in any browser"
+        summary = {"recordings": [*map(recording_summary, shown)]}
+        return Answer(summary, [line], [file], settings, f"{file.name}-{MANIFEST}")
 
 
 @dataclass(frozen=True)

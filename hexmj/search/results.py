@@ -68,7 +68,6 @@ class Result:
             "refused": len(found.refused),
             "verdict": {name: {time: judged.loc[name, time].to_dict() for time in times} for name in names},
             "settings": self.settings,
-            "files": self.files,
         }
 
 
