@@ -82,18 +82,15 @@ class Command:
 
         if (answer := self.run(given)) is None:
             return
-        files, made = answer.files, answer.settings
-        json, lines = dict(answer.json), [*answer.lines]
-        if answer.result is not None:
-            made = settings(answer.result)
-            found = searched(given)
-            json, lines = {"settings": made} | json | {"searched": found}, [*lines, settings_line(given, answer.result)]
+        files, result = answer.files, answer.result
+        made = answer.settings if result is None else settings(result)
         if made is not None and given.out:
             files.append(save_manifest(given.command, made, files, given.out / answer.manifest))
         if given.json:
-            print_json(json | {"files": files})
+            more = {} if result is None else {"settings": made, "searched": searched(given)}
+            print_json(more | dict(answer.json) | {"files": files})
         else:
-            show(*lines, *map(str, files))
+            show(*answer.lines, *([] if result is None else [settings_line(given, result)]), *map(str, files))
 
 
 class StudyCommand(Command):
@@ -173,22 +170,21 @@ def draw(result: "xr.Dataset", path: Path, which: str | None = None) -> Path:
         return save_figure(plot(result, which), path)
 
 
-def searched(given: SimpleNamespace, names: Iterable[str] | None = None) -> dict[str, list[int]]:
+def searched(given: SimpleNamespace) -> dict[str, list[int]]:
     """Return the controllers that a search found on the starts of --seed, with the seeds of their searches."""
     from hexmj.controllers.registry import load_controller, searched_on
 
-    own: Iterable[str] = [given.controller] if isinstance(given.controller, str) else given.controller
-    chosen = own if names is None else names
-    found = {what: seeds for name in chosen for what, seeds in searched_on(name, load_controller(name)).items()}
+    names: Iterable[str] = [given.controller] if isinstance(given.controller, str) else given.controller
+    found = {what: seeds for name in names for what, seeds in searched_on(name, load_controller(name)).items()}
     return {what: seeds for what, seeds in found.items() if given.seed in seeds}
 
 
-def settings_line(given: SimpleNamespace, result: "xr.Dataset", names: Iterable[str] | None = None) -> str:
+def settings_line(given: SimpleNamespace, result: "xr.Dataset") -> str:
     """Return what stands under every answer: the caption of the result, and a warning if starts were searched on."""
     from hexmj.measures.figures import caption
 
     line = caption(result).replace("$", "").replace("\N{NO-BREAK SPACE}", " ")
-    if found := searched(given, names):
+    if found := searched(given):
         seed = next(seed for seed in count(1998) if not any(seed in seeds for seeds in found.values()))
         line += f"; a search used these starts to find {', '.join(found)}, so take others: --seed {seed}"
     return line

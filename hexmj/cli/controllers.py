@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hexmj.cli.command import Answer, Command, StudyCommand
 from hexmj.cli.measures import PHYSICAL
-from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules, no_effect
+from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules, no_effect, option_fields
 from hexmj.cli.output import interval, report_checks, table, tables_that_fit
 from hexmj.errors import InputError, RenderingError, SimulationError
 from hexmj.timing import Stride
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 FILMED = 6
 """Most entrants in the film."""
 
-QUICK: dict[str, Any] = {"velocities": (0.1, 0.5, 0.9), "n_starts": 200, "physical_starts": 8, "trial_starts": 4}
-"""Sizes of a quick league."""
+QUICK: dict[str, Any] = {"velocity": (0.1, 0.5, 0.9), "starts": 200, "physical_starts": 8, "trial_starts": 4}
+"""Options of a quick league."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +31,9 @@ class LeagueOptions:
 
     controllers: tuple[str, ...] | None = None
     """Entrants; wilson-ideal begins at the ideal start of wilson. By default all."""
-    velocities: tuple[float, ...] | None = None
-    """Velocities V_r as fractions of V_p, 0 < V < 1; by default 0.1, 0.2 ... 0.9, or 0.1, 0.5, 0.9 with --quick."""
-    n_starts: int | None = None
-    """Number of random starts of kinematic walks, the same for all; by default 1000, or 200 with --quick."""
-    physical_starts: int | None = None
-    """Number of these starts that walk in physics at every velocity; by default 200, or 8 with --quick."""
-    trial_starts: int | None = None
-    """Number of these starts in each trial; by default 50, or 4 with --quick."""
     quick: bool = False
-    """A quick look: four entrants, three velocities and few starts, unless others are given."""
+    """A quick look: four entrants, V = 0.1, 0.5, 0.9, 200 starts, of which 8 walk in physics and 4 in each trial.
+    Sizes that you give count instead."""
     no_video: bool = False
     """Leave the film out."""
 
@@ -65,10 +58,10 @@ class League(StudyCommand):
         distinct("--controller", names)
         given.entrants = entrants(names)
         given.controller = list(dict.fromkeys(name.removesuffix(IDEAL) for name in names))
-        asked = {"velocities": given.velocity, "n_starts": given.starts}
-        asked |= {name: getattr(given, name) for name in ("physical_starts", "trial_starts")}
-        sizes = (QUICK if given.quick else {}) | {name: size for name, size in asked.items() if size is not None}
-        return build(League, given, controllers=given.entrants, **sizes)
+        if given.quick:
+            usual = {option.name: option.default for option in option_fields(League, "")}
+            vars(given).update((name, value) for name, value in QUICK.items() if vars(given)[name] == usual[name])
+        return build(League, given, controllers=given.entrants)
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.studies.standings import tables

@@ -28,7 +28,6 @@ from hexmj.cli.output import (
     Column,
     four_digits,
     grid,
-    intervals,
     report_line,
     table,
 )
@@ -212,10 +211,10 @@ class Compare(StudyCommand):
 
         axes, names = ("controller", "velocity"), ("both", "kin.", "phys.", "none")
         columns: dict[str, Column] = {"t": lambda data: four_digits(data.duration.item())}
-        counts = {heading: _number(name, "d") for heading, name in zip(names, AGREEMENT, strict=True)}
-        answers = {"agree": _number("agreement", ".2f"), **counts, **{name: _number(name, ".3f") for name in BESIDE}}
+        counts = {heading: _count(name) for heading, name in zip(names, AGREEMENT, strict=True)}
+        answers = {"agree": "agreement", **counts, **{name: name for name in BESIDE}}
         yield "Frequency of the loss of static stability, with 95 % intervals; physical: falls"
-        yield grid(result, axes, columns | intervals(MEASURES))
+        yield grid(result, axes, columns | {name: name for name in MEASURES})
         yield (
             "Starts that lost the planned stability and fell (both), did either (kin., phys.) or none; speed over the"
             " commanded one, least to greatest of the starts that did not fall"
@@ -224,8 +223,8 @@ class Compare(StudyCommand):
         yield report_line(physical_report(result))
 
 
-def _number(name: str, form: str) -> Column:
-    return lambda data: f"{data[name].item():{form}}"
+def _count(name: str) -> Column:
+    return lambda data: f"{data[name].item()}"
 
 
 def _speeds(data: "xr.Dataset") -> str:

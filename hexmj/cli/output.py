@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -11,8 +10,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-Column = Callable[["xr.Dataset"], str]
-"""Text of a table's cell, from the data of its row."""
+Column = str | Callable[["xr.Dataset"], str]
+"""A variable, or a function that returns the text of a cell from the data of its row."""
 
 HEADS = {"velocity": "V", "vp": "V_p", "leg_mass": "legs", "mechanism_name": "starts that"}
 """Axis of a result -> its heading in tables."""
@@ -68,23 +67,24 @@ def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iter
         yield table([head[column] for column in part], [[row[column] for column in part] for row in rows])
 
 
-def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column]) -> "Table":
+def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column] | Iterable[str]) -> "Table":
     """Return a table with a row for each label of some axes.
 
     Args:
         result: the data.
         axes: the last one varies fastest.
-        columns: heading -> text of the data in a row.
+        columns: heading -> column; of names alone, each is its own heading.
     """
+    columns = columns if isinstance(columns, Mapping) else {name: name for name in columns}
     rows = []
     for labels in product(*(result[axis].values.tolist() for axis in axes)):
         data = result.sel(dict(zip(axes, labels, strict=True)))
         names = (f"{label:g}" if isinstance(label, float) else label.replace("_", " ") for label in labels)
-        rows.append((*names, *(text(data) for text in columns.values())))
+        rows.append((*names, *(_text(data, column) for column in columns.values())))
     return table((*(HEADS.get(axis, axis) for axis in axes), *columns), rows)
 
 
-def over_velocity(result: "xr.Dataset", text: Column) -> dict[str, Column]:
+def over_velocity(result: "xr.Dataset", text: Callable[["xr.Dataset"], str]) -> dict[str, Column]:
     """Return columns for `grid`, one for each velocity."""
 
     def column(v: float) -> Column:
@@ -93,9 +93,11 @@ def over_velocity(result: "xr.Dataset", text: Column) -> dict[str, Column]:
     return {f"V = {v:g}": column(v) for v in result.velocity.values}
 
 
-def intervals(names: Iterable[str]) -> dict[str, Column]:
-    """Return columns for `grid`, each a frequency with its interval."""
-    return {name: partial(interval, measure=name) for name in names}
+def _text(data: "xr.Dataset", column: Column) -> str:
+    """Return a variable as text, with its interval if there is one."""
+    if not isinstance(column, str):
+        return column(data)
+    return interval(data, column) if f"{column}_low" in data else f"{data[column].item():.3f}"
 
 
 def interval(data: "xr.Dataset", measure: str) -> str:

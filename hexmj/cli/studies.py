@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from hexmj.cli.command import StudyCommand
-from hexmj.cli.output import Column, difference, grid, interval, intervals, lists_of, over_velocity, table
+from hexmj.cli.output import Column, difference, grid, interval, lists_of, over_velocity, table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,12 +55,12 @@ class Map(StudyCommand):
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.measures.compare import MEASURES
 
-        saved = {"static": lambda data: f"{data.static.item():.3f}", "saved": _saved}
+        saved: dict[str, Column] = {"static": lambda data: f"{data.static.item():.3f}", "saved": _saved}
         changes = {name: partial(difference, measure=name) for name in ("dynamics", "change")}
         counts = {f"{value:g}": _count(value) for value in result.value.values}
         yield f"{study.controller.name} over {study.over}: FLSS, with 95 % intervals; physical: falls"
         froude = {"Froude": lambda data: f"{data.froude.item():.2g}"}
-        yield grid(result, ("value", "velocity"), froude | intervals(MEASURES))
+        yield grid(result, ("value", "velocity"), froude | {name: name for name in MEASURES})
         yield (
             "Saved: of the starts with a static loss, those that do not fall; dynamics: physical less static FLSS;"
             f" change: physical FLSS less that at {study.over} = {result.attrs['reference']:g}"
@@ -183,15 +183,15 @@ class Converge(StudyCommand):
 
         means, axes = _means(result), ("leg_mass", "vp")
         yield f"V = {study.velocity:g}: FLSS, with 95 % intervals; physical: falls"
-        yield grid(means, axes, intervals(LOSSES))
+        yield grid(means, axes, [*LOSSES])
         yield "Starts with the kinematic answer; steps in which the planned feet stand, or are at the ground"
-        yield grid(means, axes, {heading: partial(_number, name=name) for heading, name in SAME.items()})
+        yield grid(means, axes, SAME)
         yield (
             "Distances from the planned margin until the plan loses stability: of the measured one, of that with all"
             " feet at the ground, of the centre of pressure's, of the measured one while the same feet stand; of the"
             " centre of mass from O [mm]; slip [mm/s] and tracking [mm] to the end"
         )
-        yield grid(means, axes, {heading: partial(_number, name=name) for heading, name in OFF.items()})
+        yield grid(means, axes, OFF)
 
 
 def _means(result: "xr.Dataset") -> "xr.Dataset":
@@ -199,10 +199,6 @@ def _means(result: "xr.Dataset") -> "xr.Dataset":
     from hexmj.studies.static_limit import LOSSES
 
     return result.drop_vars(LOSSES.values()).mean("start", keep_attrs=True)
-
-
-def _number(data: "xr.Dataset", name: str) -> str:
-    return f"{data[name].item():.3f}"
 
 
 class Biology(StudyCommand):
