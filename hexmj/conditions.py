@@ -6,7 +6,7 @@ Every condition is a field of one flat class, and has the same name on the comma
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from hexmj.body import STICK_INSECT, Body
 from hexmj.errors import InputError
@@ -27,22 +27,6 @@ GROUND_MEASURES: dict[GroundKind, tuple[str, ...]] = {
 
 ROUNDING = 1e-9
 """Relative tolerance with which physics steps fit into a step of the plan."""
-
-
-class Bound(NamedTuple):
-    """The range of a condition."""
-
-    least: float
-    most: float
-    unit: str
-    closed: bool = False
-    """Whether the least value is allowed too."""
-
-    def check(self, name: str, value: float) -> None:
-        """Raise InputError unless a value lies in the range."""
-        if not (self.least <= value if self.closed else self.least < value) or not value <= self.most:
-            low = f"{self.least:g} to" if self.closed else f"above {self.least:g} and at most"
-            raise InputError(f"{name} = {value}; expected {low} {self.most:g} {self.unit}".rstrip())
 
 
 @dataclass(frozen=True)
@@ -107,17 +91,12 @@ class Conditions:
             raise InputError(f"body = {self.body!r:.80}; expected a hexmj.Body")
         choice("ground", self.ground, GROUND_MEASURES)
         object.__setattr__(self, "ground_seed", whole("ground_seed", self.ground_seed, 0, 2**63 - 1))
-        for name, bound in bounds(self.body).items():
-            value = number(name, getattr(self, name))
-            object.__setattr__(self, name, value)
+        for name, (least, most, above) in ranges(self.body, self.ground).items():
+            value = getattr(self, name)
             absent = name.startswith("ground_") and name not in GROUND_MEASURES[self.ground]
             if not (absent and value == Conditions.__dataclass_fields__[name].default):
-                bound.check(name, value)
-        if self.ground == "rough":
-            lengths = self.body.lengths
-            Bound(lengths.lowest_bump, lengths.highest_bump, "mm on rough ground", closed=True).check(
-                "ground_height", self.ground_height
-            )
+                value = number(name, value, least, most, above=above)
+            object.__setattr__(self, name, float(value))
 
     def settings(self) -> dict[str, Any]:
         """Return the conditions as plain data, with the body's name."""
@@ -168,24 +147,27 @@ def check_ground(conditions: Conditions) -> None:
             raise InputError(f"{name} = {value} has no effect with ground = {conditions.ground!r}")
 
 
-def bounds(body: Body) -> dict[str, Bound]:
-    """Range of each condition for a body."""
+def ranges(body: Body, ground: GroundKind) -> dict[str, tuple[float, float, bool]]:
+    """Range of each condition for a body: the least value, the greatest, and whether it must be above the least."""
     lengths = body.lengths
+    heights = (
+        (0.0, lengths.shortest_leg, True) if ground != "rough" else (lengths.lowest_bump, lengths.highest_bump, False)
+    )
     return {
-        "vp": Bound(lengths.slowest_swing, lengths.fastest_swing, "mm/s"),
-        "step_height": Bound(0.0, lengths.highest_lift, "mm"),
-        "standing_height": Bound(0.0, lengths.highest_stand, "mm"),
-        "lift_time": Bound(0.0, 1000.0, "ms"),
-        "landing_time": Bound(0.0, 1000.0, "ms"),
-        "load": Bound(0.0, 10.0, "times the insect's weight", closed=True),
-        "centre_of_mass": Bound(-lengths.farthest_centre_of_mass, lengths.farthest_centre_of_mass, "mm", closed=True),
-        "leg_mass": Bound(0.0, 2.0, "times the insect's own"),
-        "friction": Bound(0.0, 1000.0, "", closed=True),
-        "grasp": Bound(0.0, 100.0, "times the insect's weight", closed=True),
-        "ground_height": Bound(0.0, lengths.shortest_leg, "mm, the length of the shortest leg"),
-        "ground_at": Bound(lengths.nearest_obstacle, lengths.farthest_obstacle, "mm ahead of O", closed=True),
-        "ground_length": Bound(0.0, lengths.longest_obstacle, "mm"),
-        "longest_substep": Bound(0.001, 1000.0 * body.longest_step, "ms, for which the contacts are tuned"),
-        "contact_gap": Bound(0.0, 1000.0, "ms", closed=True),
-        "settling_time": Bound(0.0, 10000.0, "ms"),
+        "vp": (lengths.slowest_swing, lengths.fastest_swing, True),
+        "step_height": (0.0, lengths.highest_lift, True),
+        "standing_height": (0.0, lengths.highest_stand, True),
+        "lift_time": (0.0, 1000.0, True),
+        "landing_time": (0.0, 1000.0, True),
+        "load": (0.0, 10.0, False),
+        "centre_of_mass": (-lengths.farthest_centre_of_mass, lengths.farthest_centre_of_mass, False),
+        "leg_mass": (0.0, 2.0, True),
+        "friction": (0.0, 1000.0, False),
+        "grasp": (0.0, 100.0, False),
+        "ground_height": heights,
+        "ground_at": (lengths.nearest_obstacle, lengths.farthest_obstacle, False),
+        "ground_length": (0.0, lengths.longest_obstacle, True),
+        "longest_substep": (0.001, 1000.0 * body.longest_step, True),
+        "contact_gap": (0.0, 1000.0, False),
+        "settling_time": (0.0, 10000.0, True),
     }

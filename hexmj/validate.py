@@ -13,10 +13,12 @@ from hexmj.errors import InputError
 Choice = TypeVar("Choice", bound=str)
 
 
-def number(name: str, value: Any, least: float = -math.inf, most: float = math.inf) -> float:
-    """Return a number as a float if it lies in [least, most]."""
+def number(name: str, value: Any, least: float = -math.inf, most: float = math.inf, above: bool = False) -> float:
+    """Return a number as a float if it lies in [least, most], or in (least, most]."""
     if not isinstance(value, Real) or isinstance(value, bool) or not least <= float(value) <= most:
         raise InputError(f"{name} = {short(value)}; expected a number{_range(least, most)}")
+    if above and value <= least:
+        raise InputError(f"{name} = {short(value)}; expected a number above {least:g}")
     return float(value) + 0.0  # -0.0 becomes 0.0
 
 
