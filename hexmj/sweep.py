@@ -244,8 +244,6 @@ class CachedValues:
             self._values = dict(_read_values(self._path))
         self._read = frozenset(self._values)
         self._replayed: set[bytes] = set()
-        self.known = len(self._read)
-        """Number of values that the file held."""
 
     def __call__(self, rows: np.ndarray) -> np.ndarray:
         """Return the values, (row,), of rows (row, number)."""

@@ -1,7 +1,6 @@
 """Results on disk: NetCDF with all bits, atomic files, settings as plain data, manifests."""
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -76,13 +75,6 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path: Path) -> 
         part.write_text("ne")
         raise OSError(28, "No space left on device")
     assert path.read_text() == "old" and [*tmp_path.iterdir()] == [path]
-
-
-def test_two_writers_leave_one_whole_file(tmp_path: Path) -> None:
-    texts = ["a" * 100_000, "b" * 100_000]
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda i: write_text(tmp_path / "a.txt", texts[i % 2]), range(40)))
-    assert (tmp_path / "a.txt").read_text() in texts and len([*tmp_path.iterdir()]) == 1
 
 
 class Side(Enum):

@@ -20,7 +20,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.errors import InputError
-from hexmj.sweep import CachedValues, Cell, over_axes, run_cells, run_study, threads_each, workers
+from hexmj.sweep import Cell, over_axes, run_cells, run_study, threads_each, workers
 from small_cells import (
     ENVIRONMENT,
     Wave,
@@ -289,19 +289,3 @@ def test_two_sweeps_share_a_folder(tmp_path: Path) -> None:
     both = [start_sweep(tmp_path / "cells", tmp_path, processes) for processes in (1, 2)]
     assert [running.wait(60) for running in both] == [0, 0]
     assert len(cached(tmp_path / "cells")) == 30 and not list((tmp_path / "cells").glob(".part-*"))
-
-
-def test_cached_values_are_computed_once_and_a_torn_line_is_computed_again(tmp_path: Path) -> None:
-    rows = np.arange(6.0).reshape(3, 2)
-    cell = Cell("squares", squares, {})
-    first = CachedValues(cell, tmp_path)
-    assert first(rows).tolist() == [1.0, 13.0, 41.0]
-    (path,) = tmp_path.iterdir()
-    path.write_bytes(path.read_bytes()[:-5])
-    second = CachedValues(cell, tmp_path)
-    assert second.known == 2 and second(rows).tolist() == [1.0, 13.0, 41.0] and second.replayed == 2
-    assert CachedValues(cell, tmp_path).known == 3 and CachedValues(cell, tmp_path, fresh=True).known == 0
-
-
-def squares(rows: np.ndarray) -> np.ndarray:
-    return (rows**2).sum(axis=1)
