@@ -1,6 +1,7 @@
 """Base of the commands: options, help with examples, running a study, and the answer with its manifest."""
 
-from collections.abc import Iterable, Iterator, Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from hexmj.cli.options import Figures, Output, Planning, Results, Workers, build, flat, options_class
 from hexmj.cli.output import lists_of, print_json, show
+from hexmj.errors import RenderingError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -168,6 +170,18 @@ def draw(result: "xr.Dataset", path: Path, which: str | None = None) -> Path:
 
     with as_shipped():
         return save_figure(plot(result, which), path)
+
+
+def filmed(path: Path, recordings: "Sequence[xr.Dataset]", *film: Any) -> list[Path]:
+    """Film recordings and return the file, or nothing if films cannot be rendered on this machine."""
+    from hexmj.replay.video import render
+
+    try:
+        render(recordings, path, *film, progress=True)
+    except RenderingError as error:
+        print(f"hexmj: no video: {error}", file=sys.stderr)
+        return []
+    return [path]
 
 
 def searched(given: SimpleNamespace) -> dict[str, list[int]]:

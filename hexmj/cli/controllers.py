@@ -1,17 +1,16 @@
 """`hexmj league`, `hexmj ablate`, `hexmj search` and `hexmj check-controller`."""
 
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from hexmj.cli.command import Answer, Command, StudyCommand
+from hexmj.cli.command import Answer, Command, StudyCommand, filmed
 from hexmj.cli.measures import PHYSICAL
 from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules, no_effect, option_fields
 from hexmj.cli.output import interval, report_checks, table, tables_that_fit
-from hexmj.errors import InputError, RenderingError, SimulationError
+from hexmj.errors import InputError
 from hexmj.timing import Stride
 from hexmj.validate import distinct
 
@@ -71,38 +70,20 @@ class League(StudyCommand):
             yield from tables_that_fit(one.head, one.rows)
 
     def others(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
+        """Write the tables, and film the best entrants in physics side by side from the first random start."""
         from hexmj.files import write_text
-        from hexmj.studies.standings import league_markdown
+        from hexmj.replay.film import Film
+        from hexmj.replay.recording import Start
+        from hexmj.studies.standings import by_rank, league_markdown
 
         files = [write_text(given.out / "league.md", league_markdown(result))]
-        if not given.no_video:
-            try:
-                files.append(_film(given, result))
-            except RenderingError as error:
-                print(f"hexmj: no video: {error}", file=sys.stderr)
-        return files
-
-
-def _film(given: SimpleNamespace, result: "xr.Dataset") -> Path:
-    """Film the best entrants in physics side by side, from the first random start."""
-    from hexmj.replay.film import Film
-    from hexmj.replay.recording import Start
-    from hexmj.replay.video import render
-    from hexmj.studies.standings import by_rank
-
-    best = [name for name in by_rank(result).entrant.values if not given.entrants[name].ideal][:FILMED]
-    shown = []
-    for name in best:
+        best = [name for name in by_rank(result).entrant.values if not given.entrants[name].ideal][:FILMED]
+        if given.no_video or not best:
+            return files
         how: Any = {"velocity": given.trial_velocity, "start": 0, "acceleration": None}
-        start = build(Start, given, controller=given.entrants[name].controller, **how)
-        try:
-            shown.append(start.recorded(True, name, given.threads))
-        except (InputError, SimulationError) as error:
-            print(f"hexmj: {name} is not in the video: {error}", file=sys.stderr)
-    if not shown:
-        raise RenderingError("no entrant walks from the first random start")
-    render(shown, given.out / "league.mp4", Film(width=480, height=360), progress=True)
-    return given.out / "league.mp4"
+        walks = {name: build(Start, given, controller=given.entrants[name].controller, **how) for name in best}
+        shown = [walk.recorded(True, name, given.threads) for name, walk in walks.items()]
+        return files + filmed(given.out / "league.mp4", shown, Film(width=480, height=360))
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """`hexmj walk`, `hexmj flss` and `hexmj compare`."""
 
 import math
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.cli.command import Answer, Command, StudyCommand, at_work, draw
+from hexmj.cli.command import Answer, Command, StudyCommand, at_work, draw, filmed
 from hexmj.cli.options import (
     Figures,
     Output,
@@ -33,7 +32,7 @@ from hexmj.cli.output import (
 )
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import InputError, RenderingError
+from hexmj.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -173,10 +172,7 @@ class Compare(StudyCommand):
 
     def others(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
         """Write a recording of the first controller near V = 0.3, from a start that stays stable, and its video."""
-        import numpy as np
-
         from hexmj.replay.recording import Start, save_recording
-        from hexmj.replay.video import render
 
         if given.no_video:
             return []
@@ -186,13 +182,7 @@ class Compare(StudyCommand):
         start = int(np.argmax((np.isinf(data.planned_loss) & np.isinf(data.fall)).values))
         first = build(Start, given, controller=controller(given, given.controller[0]), velocity=v, start=start)
         walked = first.recorded(True, name, given.threads)
-        files = [save_recording(walked, given.out / "recording.nc")]
-        try:
-            render([walked], given.out / "gait.mp4", progress=True)
-            files.append(given.out / "gait.mp4")
-        except RenderingError as error:
-            print(f"hexmj: no video: {error}", file=sys.stderr)
-        return files
+        return [save_recording(walked, given.out / "recording.nc"), *filmed(given.out / "gait.mp4", [walked])]
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         from hexmj.io import settings
