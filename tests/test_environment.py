@@ -120,21 +120,6 @@ def test_sensory_feedback_changes_the_walk():
     assert (seen[0] != seen[1]).all()
 
 
-def test_rows_of_control_are_taken_in_order():
-    """For any number of substeps at once; the last row stays."""
-    walking = dm.load(actions="joints", duration=5.0)
-    walking.reset()
-    physics, rows = walking.physics, np.linspace(0.0, 0.3, 3)[:, None] + walking.physics.control()
-    other = physics.copy()
-    physics.set_control(rows)
-    other.set_control(rows)
-    physics.step(4)
-    for _ in range(4):
-        other.step()
-    np.testing.assert_array_equal(physics.control(), rows[2])
-    np.testing.assert_allclose(other.position(), physics.position(), rtol=0, atol=1e-12)
-
-
 @KINDS
 def test_same_seed_same_bits(actions):
     def episodes(seed: int) -> list[np.ndarray]:

@@ -248,7 +248,7 @@ def test_a_mask_resets_some_insects_and_the_others_continue():
         same = all(np.array_equal(before[name][i], after[name][i]) for name in before)
         assert same is not reset
     assert_same({name: values[1] for name, values in after.items()}, StickInsect(**TIPS).reset(seed=6)[0])
-    assert many.np_random_seed == (0, 6, 2)
+    assert many.np_random_seed == [0, 6, 2]
 
 
 def test_a_step_after_the_end_needs_a_reset():

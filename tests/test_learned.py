@@ -84,7 +84,8 @@ def test_a_walk_under_other_conditions_is_refused():
         with pytest.raises(InputError):
             StickInsect(controller=policy, conditions=other).reset(seed=0)
         with pytest.raises(InputError):
-            hexmj.physical_walk(start, WithOffsets(Ahead(), policy, other), 0.3, 1.0, conditions=other)
+            outer = WithOffsets(Ahead(), controller=policy, conditions=other)
+            hexmj.physical_walk(start, outer, 0.3, 1.0, conditions=other)
     hexmj.physical_walk(start, policy, 0.3, 1.0, conditions=Conditions(load=1.0))
 
 

@@ -98,7 +98,7 @@ FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
         Terrain(hexmj.SensoryFeedback(LIMITED), **FAST),
         Terrain(LegLost(LIMITED, 0), **FAST),
         Terrain(PoorSenses(hexmj.SensoryFeedback(LIMITED)), **FAST),
-        Terrain(WithOffsets(Still(), LIMITED), **FAST),
+        Terrain(WithOffsets(Still(), controller=LIMITED), **FAST),
         League({"limited": Entrant(LIMITED)}, (0.1, 0.3), **FEW),
         League({"limited": Entrant(LIMITED)}, (0.1,), trial_velocity=0.3, **FEW),
         League({"limited": Entrant(LIMITED, ideal=True)}, (0.1, 0.3), **FEW),

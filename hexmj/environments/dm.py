@@ -18,7 +18,7 @@ from hexmj.bodies.mjcf import check_home, compile_body
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller
-from hexmj.environments.observing import beyond, worth
+from hexmj.environments.observing import worth
 from hexmj.environments.task import (
     Actions,
     Task,
@@ -29,9 +29,8 @@ from hexmj.environments.task import (
     observation_bounds,
 )
 from hexmj.environments.walkers import Acted, Alone, Walkers
-from hexmj.errors import InputError
 from hexmj.physics.engine import Diverged
-from hexmj.physics.substeps import Shown
+from hexmj.physics.substeps import FineSteps, Shown
 from hexmj.timing import Stride
 from hexmj.validate import whole
 
@@ -81,10 +80,11 @@ class InsectPhysics(mujoco.Physics):
     shown: Shown
     """Sensors, torques and depth of the last step, each (1, substep, ...)."""
 
+    rows: np.ndarray | None = None
+    """Joint targets of the substeps to come, (substep, actuator) [rad]; by default those of `set_control`."""
+
     def _reload_from_data(self, data: wrapper.MjData) -> None:
         super()._reload_from_data(data)
-        self._control = data.ctrl
-        self._rows = np.array(data.ctrl, ndmin=2)
         self._alone: Alone | None = None
 
     def copy(self, share_model: bool = False) -> "InsectPhysics":
@@ -93,35 +93,18 @@ class InsectPhysics(mujoco.Physics):
         copied.compiled = self.compiled
         return copied
 
-    def __getstate__(self) -> tuple[wrapper.MjData, CompiledBody]:
-        return self.data, self.compiled
-
-    def __setstate__(self, state: tuple[wrapper.MjData, CompiledBody]) -> None:
-        data, self.compiled = state
-        self._reload_from_data(data)
-
     def after_reset(self) -> None:
         """Compute everything; dm_control leaves out the actuators, which the first step needs."""
         self.forward()
 
-    def set_control(self, control: np.ndarray) -> None:
-        """Set joint targets [rad]: (actuator,), or (substep, actuator), one row for each substep to come."""
-        self._rows = np.array(control, ndmin=2)
-        self._control[:] = self._rows[0]
-
     def step(self, nstep: int = 1) -> None:
         """Advance by `nstep` substeps, which are divided if a foot strikes the ground, see `substeps`."""
-        rows = self._rows
-        rows[0] = self._control
-        if len(rows) < nstep:
-            rows = np.concatenate([rows, np.repeat(rows[-1:], nstep - len(rows), axis=0)])
+        rows = self.data.ctrl[np.newaxis].repeat(nstep, axis=0) if self.rows is None else self.rows
+        self.rows = None
         try:
-            self.shown = self.alone.take(ONLY, rows[np.newaxis, :nstep])
+            self.shown = FineSteps.of(self.alone, nstep, self.compiled).take(ONLY, rows[np.newaxis])
         except Diverged as error:
             raise control.PhysicsError(f"the simulation diverged: {error.kinds}") from None
-        self._rows = rows[min(nstep, len(rows) - 1) :]
-        if len(rows) > nstep:
-            self._control[:] = self._rows[0]
 
     @property
     def alone(self) -> Alone:
@@ -152,28 +135,21 @@ class Walking(control.Task):
 
     def initialize_episode(self, physics: InsectPhysics) -> None:
         """Settle the next start."""
-        self._walkers = Walkers(self.task, physics.compiled, physics.alone, physics.alone.take, count=1, threads=1)
+        self._walkers = Walkers(self.task, physics.compiled, physics.alone, count=1, threads=1)
         self._acted, self._spec = Acted(*np.zeros((3, 1))), self.action_spec(physics)
-        self._bounds = self._spec.minimum, self._spec.maximum
         self._walkers.begin(ONLY, draw_start(self._random, self.task))
 
     def before_step(self, action: np.ndarray, physics: InsectPhysics) -> None:
         """Advance the plan by one step and set the joint targets."""
         self._walkers.check_begun()
-        spec, action = self._spec, checked_actions(action, self._spec.shape)
-        if (i := beyond(action, *self._bounds)) >= 0:
-            name, least, most = action_names(physics.compiled, self.task)[i], spec.minimum[i], spec.maximum[i]
-            raise InputError(f"the action's {name} = {action[i]}; expected {least:.4g} to {most:.4g}")
-        if self._acted.terminated or self._acted.truncated:
-            return
+        spec = self._spec
+        action = checked_actions(action, spec.shape, spec.minimum, spec.maximum)
         self._look(physics)
-        self._walkers.begun = False  # until the step has succeeded
-        physics.set_control(self._walkers.control(action[np.newaxis])[0])
+        physics.rows = self._walkers.control(action[np.newaxis])[0]
 
     def after_step(self, physics: InsectPhysics) -> None:
         """Compute reward and end of the step."""
         self._acted = self._walkers.judge(physics.shown)
-        self._walkers.begun = True
 
     def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
         """Return the bounds of an action; tabs separate the names of its numbers."""

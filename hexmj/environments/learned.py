@@ -7,7 +7,7 @@ there the insect is upright, walks at the commanded velocity and stands on the f
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,12 +15,11 @@ from hexmj.bodies.kinematics import standing_tips
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.planning import check_velocities
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed
+from hexmj.controllers.wrappers import WrappedPlan, Wrapper
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import TipTargets, check_made_for
 from hexmj.rotations import lean
-from hexmj.timing import Acceleration, Stride
 from hexmj.walks import PlannedWalk, copied, joined
 
 TILT, VELOCITY, TURNING = slice(0, 2), slice(2, 5), slice(5, 8)
@@ -73,47 +72,31 @@ def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> n
 
 
 @dataclass(frozen=True)
-class WithOffsets:
+class WithOffsets(Wrapper):
     """A controller whose planned tips are offset by a policy."""
 
+    controller: Controller = field(default=LDVS, kw_only=True)
+    """The controller that plans."""
     policy: Policy
     """The learned policy."""
-    controller: Controller = LDVS
-    """The controller that plans."""
     conditions: Conditions = field(default_factory=Conditions)
     """Conditions of the walk: their V_p and foot path lift and lower the feet, and their body scales the offsets.
     Physical walks under other conditions are refused."""
-    name: str = field(default="learned")
+    name: str = "learned"
 
-    def check_velocity(self, velocity: float, stride: Stride) -> None:
-        """As the controller that plans."""
-        check_velocities(self.controller, [velocity], stride)
-
-    def begin(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> "OffsetPlan":
-        """Begin a plan, see `protocol.Controller.begin`.
-
-        Raises:
-            InputError: the inner controller was made for other conditions.
-        """
-        plan = self.controller.begin(starts, velocity, stride, acceleration, threads)
+    def wrap(self, plan: Any) -> "OffsetPlan":
+        """See `Wrapper`; the inner controller must not be made for other conditions."""
         check_made_for(plan, self.conditions)
         return OffsetPlan(plan, self.policy, self.conditions)
 
 
-class OffsetPlan:
+class OffsetPlan(WrappedPlan):
     """A `protocol.FeedbackPlan`: another plan's tips with a policy's offsets, and the heights of the foot path."""
 
     def __init__(self, plan: Plan, policy: Policy, conditions: Conditions) -> None:
         """Wrap a plan at time 0."""
-        self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
-        self._plan, self._policy, self.made_for = plan, policy, conditions
+        super().__init__(plan)
+        self._policy, self.made_for = policy, conditions
         self._targets = TipTargets(plan.starts, conditions, plan.stride)
         self._tips = standing_tips(plan.starts, conditions.standing_height, plan.stride)
         self._stance = np.ones(plan.starts.shape)
@@ -134,7 +117,7 @@ class OffsetPlan:
         return joined([self._step() for _ in range(steps)])
 
     def _step(self) -> PlannedWalk:
-        step, count = copied(self._plan.advance(1)), len(self.starts)
+        step, count = copied(super().advance(1)), len(self.starts)
         seen = np.where(self._sensed, self._felt, self._upright(step.velocity[0]))
         actions = np.asarray(self._policy(seen), dtype=float)
         if actions.shape != (count, 18) or np.isnan(actions).any():
@@ -144,7 +127,6 @@ class OffsetPlan:
         offset = np.clip(actions, -1.0, 1.0).reshape(count, 6, 3)
         offset = self.made_for.body.lengths.largest_tip_offset * offset
         self._tips, self._stance = self._targets.follow(step, np.arange(count))[:, -1], step.stance[0].astype(float)
-        self.done = self._plan.done
         x, y, up = np.moveaxis(self._tips + offset, -1, 0)
         rear, front = np.minimum(step.x[0], self.stride.pep_min), np.maximum(step.x[0], self.stride.aep0)
         x = np.clip(x - np.array(self.stride.geometry.origin), rear, front)

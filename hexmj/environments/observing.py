@@ -14,9 +14,6 @@ from hexmj.environments.task import Task, observation_bounds
 from hexmj.jitted import jitted, part
 from hexmj.stability import margins
 
-ROUNDING = 1e-6
-"""Tolerance of an action's bounds: a bound that was rounded to single precision is allowed."""
-
 
 class Places(NamedTuple):
     """The state of some insects now."""
@@ -81,36 +78,6 @@ class Observer:
 
 
 @jitted
-def scaled(actions: Any, ids: Any, usual: Any, span: Any) -> Any:
-    """Convert actions from -1 to 1 into joint angles [rad] or offsets [mm].
-
-    Args:
-        actions: of all insects, (insect, number).
-        ids: insects that walk, (n,).
-        usual: value for the action 0, (number,).
-        span: distance from there to the least and to the greatest value, (2, number).
-
-    Returns:
-        The values, (n, number), and whether all actions are within their bounds.
-    """
-    wanted, within = np.empty((len(ids), actions.shape[1])), True
-    for i, n in enumerate(ids):
-        for j in range(actions.shape[1]):
-            within &= abs(actions[n, j]) <= 1.0 + ROUNDING
-            wanted[i, j] = usual[j] + actions[n, j] * span[1 if actions[n, j] > 0 else 0, j]
-    return wanted, within
-
-
-@jitted
-def beyond(action: Any, low: Any, high: Any) -> int:
-    """Return the index of the first number of an action, (number,), outside its bounds; -1 if all are within."""
-    for j in range(len(action)):
-        if not low[j] - ROUNDING <= action[j] <= high[j] + ROUNDING:
-            return j
-    return -1
-
-
-@jitted
 def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
     """Return the tip targets of some insects for their next step, (n, substep, leg, axis) [mm].
 
@@ -135,29 +102,6 @@ def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
                 planned[1][n, leg, axis] = tips_ahead[n, step, tips.shape[1] - 1, leg, axis]
         at[n] = step + 1
     return tips
-
-
-@jitted
-def keep(joints: Any, reachable: Any, ids: Any, last: Any, missed: Any) -> None:
-    """Let legs that cannot reach their tips keep their last angles.
-
-    Args:
-        joints: angles for the tips, (n, substep, leg, joint) [rad]; replaced where a tip is out of reach.
-        reachable: tips within reach, (n, substep, leg).
-        ids: insects, (n,).
-        last: last angles of all insects, (insect, leg, joint); updated.
-        missed: substeps in which a tip is out of reach, (insect, leg); updated.
-    """
-    for i, n in enumerate(ids):
-        for leg in range(6):
-            missed[n, leg] = 0.0
-            for sub in range(joints.shape[1]):
-                missed[n, leg] += not reachable[i, sub, leg]
-                for j in range(joints.shape[3]):
-                    if reachable[i, sub, leg]:
-                        last[n, leg, j] = joints[i, sub, leg, j]
-                    else:
-                        joints[i, sub, leg, j] = last[n, leg, j]
 
 
 @jitted

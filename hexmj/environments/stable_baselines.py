@@ -18,7 +18,6 @@ except ImportError:
     raise without_extra("rl", "stable-baselines3") from None
 
 from hexmj.environments.learned import FELT, MOST, felt_in
-from hexmj.environments.observing import ROUNDING
 from hexmj.environments.task import checked_actions
 from hexmj.environments.vector import StickInsects
 from hexmj.validate import whole
@@ -139,10 +138,7 @@ class HeldInsects(VecEnvWrapper):
         Raises:
             InputError: the shape is another one, or a number is out of bounds.
         """
-        actions = checked_actions(actions, (self.num_envs, *self._shape))
-        if not (within := np.abs(actions) <= 1.0 + ROUNDING).all():
-            raise InputError(f"an action has {actions[~within][0]}; expected -1 to 1")
-        self._actions = actions
+        self._actions = checked_actions(actions, (self.num_envs, *self._shape))
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Take all steps of one action.

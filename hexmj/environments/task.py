@@ -48,8 +48,8 @@ from hexmj.validate import choice, number
 Actions = Literal["joints", "tips"]
 """Kinds of actions: targets of the joints, or offsets to the tips."""
 
-DOUBLE = np.dtype(np.float64)
-"""Type of actions. NumPy has one such object, so that `is` compares it in no time."""
+ROUNDING = 1e-6
+"""Tolerance of an action's bounds: a bound that was rounded to single precision is allowed."""
 
 BEYOND_RANGE = 0.5
 """Angle by which observed joints may exceed their ranges, whose limits are soft [rad]."""
@@ -148,16 +148,19 @@ def action_bounds(compiled: CompiledBody, task: Task) -> tuple[np.ndarray, np.nd
     return -most, np.zeros(len(most)), most
 
 
-def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return actions as floats in their shape. Their bounds are checked when they are carried out.
+def checked_actions(
+    actions: Any, shape: tuple[int, ...] | None, low: np.ndarray | float = -1.0, high: np.ndarray | float = 1.0
+) -> np.ndarray:
+    """Return actions as floats in their shape, within their bounds except for `ROUNDING`.
 
     Raises:
-        InputError: the shape is another one.
+        InputError: the shape is another one, or a number is out of its bounds.
     """
-    if not (type(actions) is np.ndarray and actions.dtype is DOUBLE):
-        actions = np.asarray(actions, dtype=float)
+    actions = np.asarray(actions, dtype=float)
     if actions.shape != shape:
         raise InputError(f"an action has the shape {actions.shape}; expected {shape}")
+    if not (within := (actions >= low - ROUNDING) & (actions <= high + ROUNDING)).all():
+        raise InputError(f"an action has {actions[~within][0]}, which is out of its bounds")
     return actions
 
 

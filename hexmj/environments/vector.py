@@ -19,17 +19,16 @@ try:
 except ModuleNotFoundError:
     raise without_extra("gym", "gymnasium") from None
 
-from hexmj.environments.gym import Frames, checked_mode, compiled_for, metadata_of, spaces_of
-from hexmj.environments.task import Task, action_names, checked_actions, draw_start
+from hexmj.environments.gym import Insects
+from hexmj.environments.task import checked_actions, draw_start
 from hexmj.environments.walkers import Walkers
 from hexmj.physics.engine import MujocoBatch
-from hexmj.physics.substeps import FineSteps
 from hexmj.validate import choice, whole
 
 Observations = dict[str, np.ndarray]
 
 
-class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
+class StickInsects(Insects, VectorEnv[Observations, np.ndarray, np.ndarray]):
     """Insects, each in an episode of its own."""
 
     def __init__(
@@ -53,22 +52,18 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
         Raises:
             InputError: a value is out of its range.
         """
-        self.task, self.num_envs = Task(**task), whole("num_envs", num_envs, 1)
-        self._compiled = compiled = compiled_for(self.task)
-        self.render_mode = checked_mode(render_mode)
+        self.single_observation_space, self.single_action_space = self.prepare(render_mode, task)
+        self.num_envs = whole("num_envs", num_envs, 1)
         mode: Any = getattr(autoreset_mode, "value", autoreset_mode)
         self.autoreset_mode = AutoresetMode(choice("autoreset_mode", mode, [m.value for m in AutoresetMode]))
-        self.metadata = metadata_of(self.task) | {"autoreset_mode": self.autoreset_mode}
-        self.single_observation_space, self.single_action_space = spaces_of(compiled, self.task)
+        self.metadata |= {"autoreset_mode": self.autoreset_mode}
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._bodies = MujocoBatch(compiled, self.num_envs, threads)
-        take = FineSteps.of(self._bodies, self.task.substeps, compiled).take
-        self._walkers = Walkers(self.task, compiled, self._bodies, take, self.num_envs, threads)
-        self._rngs: list[np.random.Generator] = []
-        self._seeds: list[int] = []
+        self._bodies = MujocoBatch(self._compiled, self.num_envs, threads)
+        self._walkers = Walkers(self.task, self._compiled, self._bodies, self.num_envs, threads)
+        self._np_random: Any = [None] * self.num_envs  # a generator and a seed for each insect
+        self._np_random_seed: Any = [None] * self.num_envs
         self._ended = np.zeros(self.num_envs, dtype=bool)
-        self._frames = Frames(self.task.conditions) if render_mode else None
 
     def reset(  # pyright: ignore[reportIncompatibleMethodOverride]  # as Gymnasium's own vector environments
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -88,7 +83,15 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
             raise InputError(f"reset_mask = {which!r:.80}; expected {self.num_envs} booleans, at least one True")
         if not (self._walkers.begun or which.all()):
             raise InputError("reset_mask leaves out insects, but none has begun or a step or a reset failed; reset all")
-        self._seed(_seeds(seed, self.num_envs), which)
+        seeds: Any = [None] * self.num_envs if seed is None else seed
+        if isinstance(seeds, Integral):
+            seeds = [seeds + i for i in range(self.num_envs)]
+        if len(seeds) != self.num_envs:
+            raise InputError(f"seed has {len(seeds)} values; expected one for each of {self.num_envs} insects")
+        seeds = [None if one is None else whole("seed", one, 0) for one in seeds]
+        for i in np.flatnonzero(which).tolist():
+            if seeds[i] is not None or self._np_random[i] is None:
+                self._np_random[i], self._np_random_seed[i] = seeding.np_random(seeds[i])
         self._begin(which)
         return self._observations(), {}
 
@@ -102,7 +105,7 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
             InputError: an action is out of bounds.
             SimulationError: the simulation diverged, or a start does not settle; reset all insects then.
         """
-        actions = checked_actions(actions, (self.num_envs, len(action_names(self._compiled, self.task))))
+        actions = checked_actions(actions, self.action_space.shape)
         acted, before = self._walkers.act(actions), self._ended
         ended, infos = acted.terminated | acted.truncated, {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
@@ -118,38 +121,9 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
         """Return a frame of every insect, (height, width, 3), with `render_mode`."""
         return tuple(self._frames.draw(qpos) for qpos in self._bodies.qpos) if self._frames else None
 
-    def close_extras(self, **kwargs: Any) -> None:
-        """Free the renderer."""
-        if self._frames:
-            self._frames.close()
-
-    def __reduce__(self) -> Any:
-        """Refuse copies, which would not share the memory that MuJoCo steps."""
-        raise InputError("an environment cannot be copied or pickled; make another one")
-
-    @property
-    def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The insects' generators."""
-        return tuple(self._rngs)
-
-    @property
-    def np_random_seed(self) -> tuple[int, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The insects' seeds."""
-        return tuple(self._seeds)
-
-    def _seed(self, seeds: list[int | None], which: np.ndarray) -> None:
-        """Make new generators of some insects that have a seed; at first of all insects."""
-        if not self._rngs:
-            made = [seeding.np_random(seed) for seed in seeds]
-            self._rngs, self._seeds = [rng for rng, _ in made], [seed for _, seed in made]
-            return
-        for i in np.flatnonzero(which).tolist():
-            if seeds[i] is not None:
-                self._rngs[i], self._seeds[i] = seeding.np_random(seeds[i])
-
     def _begin(self, which: np.ndarray) -> None:
         ids = np.flatnonzero(which)
-        self._walkers.begin(ids, np.concatenate([draw_start(self._rngs[i], self.task) for i in ids.tolist()]))
+        self._walkers.begin(ids, np.concatenate([draw_start(self._np_random[i], self.task) for i in ids.tolist()]))
         self._ended = self._ended & ~which
 
     def _observations(self) -> Observations:
@@ -157,19 +131,7 @@ class StickInsects(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def _final(self, ended: np.ndarray) -> dict[str, Any]:
         """Return the last observations of episodes that ended, as Gymnasium's `infos`."""
-        last, observations, infos = self._walkers.observations(), np.full(self.num_envs, None, dtype=object), {}
+        last, observations = self._walkers.observations(), np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended).tolist():
-            observations[i] = self._walkers.observer.named(last[i].copy())
-            infos = self._add_info(infos, {"final_info": {}}, i)
-        return infos | {"final_obs": observations, "_final_obs": ended}
-
-
-def _seeds(seed: Any, count: int) -> list[int | None]:
-    """Return a seed for each insect."""
-    if seed is None:
-        return [None] * count
-    if isinstance(seed, Integral):
-        return [whole("seed", seed, 0) + i for i in range(count)]
-    if len(seed) != count:
-        raise InputError(f"seed has {len(seed)} values; expected one for each of {count} insects")
-    return [None if value is None else whole("seed", value, 0) for value in seed]
+            observations[i] = self._walkers.observer.named(last[i])
+        return {"final_obs": observations, "_final_obs": ended, "final_info": {}, "_final_info": ended}

@@ -5,7 +5,6 @@ a plan with sensory feedback receives the state of the legs before each step. An
 its walk depends neither on their number nor on the insects that began with it.
 """
 
-from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Union
@@ -18,29 +17,23 @@ from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.bodies.kinematics import standing_tips
 from hexmj.controllers.planning import advanced, begin
 from hexmj.controllers.protocol import FeedbackPlan, Plan
-from hexmj.environments.observing import ROUNDING, Observer, Places, Planned, judge, keep, order, scaled
-from hexmj.environments.task import Task, action_bounds, action_names
+from hexmj.environments.observing import Observer, Places, Planned, judge, order
+from hexmj.environments.task import Task, action_bounds
 from hexmj.errors import InputError
-from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, check_no_callbacks, walk_error
-from hexmj.physics.foot_path import TipTargets, check_made_for
+from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, stepping, walk_error
+from hexmj.physics.foot_path import TipTargets, check_made_for, hold
 from hexmj.physics.rollout import Senses
 from hexmj.physics.settle import Settling
-from hexmj.physics.substeps import FineSteps, Shown, allowed_depth, strikes
+from hexmj.physics.substeps import FineSteps, Shown
 
 AHEAD = 128
 """Steps planned at once without sensory feedback."""
-
-Take = Callable[[np.ndarray, np.ndarray], Shown]
-"""Takes one step of some bodies, (n,), with controls, (n, substep, actuator); see `substeps.FineSteps.take`."""
 
 Bodies = Union["Alone", MujocoBatch]
 """Engine of the insects, which shows their places and puts them into a state."""
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """The whole state before a step, with the time."""
-
-NEVER, ONCE = (np.full(mujoco.mjtWarning.mjNWARNING.value, count, np.int32).tobytes() for count in (0, 1))
-"""Counts of MuJoCo's warnings of each kind, as bytes, which are compared faster."""
 
 
 class Acted(NamedTuple):
@@ -66,8 +59,6 @@ class Together:
     """The plan of all that began."""
     targets: TipTargets
     """The tip targets of all that began."""
-    feedback: FeedbackPlan | None
-    """The same plan if it has sensory feedback."""
     ahead: int = 0
     """Planned steps that are not walked yet."""
 
@@ -75,27 +66,23 @@ class Together:
 class Walkers:
     """Insects, each in an episode of its own."""
 
-    def __init__(
-        self, task: Task, compiled: CompiledBody, bodies: Bodies, take: Take, count: int, threads: int | None
-    ) -> None:
+    def __init__(self, task: Task, compiled: CompiledBody, bodies: Bodies, count: int, threads: int | None) -> None:
         """Prepare `count` insects. `threads` settle them, by default one per core."""
         self._task, self._compiled, self._threads = task, compiled, threads
-        self._take, self._settling = take, Settling(task.conditions, task.stride, threads)
+        self._settling = Settling(task.conditions, task.stride, threads)
         self._steps, self._substeps = task.steps, task.substeps
-        self._grasps = task.conditions.grasp > 0
         self._ends = task.conditions.ground in WITH_ENDS
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self.begun = False
         """Whether steps may follow: all have begun, and no step or reset has failed since."""
-        self._of: dict[int, Together] = {}
         self._together: list[Together] = []
         tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
         self._ahead = tips, stance, np.zeros(count, dtype=int)  # plans, and the index of the next step
         self._joints = np.empty((count, 6, compiled.joints // 6))
         self._planned = Planned(np.ones((count, 6)), np.empty((count, 6, 3)), np.zeros((count, 6)))
         low, self._usual, high = action_bounds(compiled, task)
-        self._span = np.array([self._usual - low, high - self._usual])
+        self._below, self._above = self._usual - low, high - self._usual
         self.observer = Observer(compiled, task)
         self._trunk = compiled.columns.trunk.start, compiled.columns.trunk.stop
         self.look(bodies)
@@ -103,6 +90,7 @@ class Walkers:
     def look(self, bodies: Bodies) -> None:
         """Refer to the arrays of these bodies, which change with each step."""
         self.bodies, self.places = bodies, Places(bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors)
+        self._fine = FineSteps.of(bodies, self._substeps, self._compiled)
         self._passed = tuple(self.places), tuple(self._planned)  # compiled code receives plain tuples faster
 
     def begin(self, ids: np.ndarray, starts: np.ndarray) -> None:
@@ -115,11 +103,9 @@ class Walkers:
         settled = self._settling.at(starts, ids)
         plan = begin(task.controller, starts, task.velocity, task.stride, threads=self._threads)
         check_made_for(plan, task.conditions)
-        targets = TipTargets(settled.starts, task.conditions, task.stride)
         self._leave(ids)
-        group = Together(ids, np.arange(len(ids)), plan, targets, plan if isinstance(plan, FeedbackPlan) else None)
-        self._together.append(group)
-        self._of |= dict.fromkeys(ids.tolist(), group)
+        targets = TipTargets(settled.starts, task.conditions, task.stride)
+        self._together.append(Together(ids, np.arange(len(ids)), plan, targets))
         self.bodies.stand(ids, settled.state, settled.ctrl)
         if len(ids) == self._count:
             self._senses = Senses(settled)
@@ -139,22 +125,19 @@ class Walkers:
             actions: of every insect, (insect, number): 0 is the usual action, -1 the least and 1 the greatest.
 
         Raises:
-            InputError: an action is out of bounds, no episode has begun, or a plan is invalid.
+            InputError: no episode has begun, or a plan is invalid.
             SimulationError: the simulation of an insect diverged.
         """
         self.check_begun()
-        ids = self._ids
-        if len(ids) == 0:
+        if self.over:
             return self._nothing()
-        wanted, within = scaled(actions, ids, self._usual, self._span)
-        if not within:
-            raise self._beyond(actions, ids)
+        actions = actions[self._ids]
+        control = self.control(self._usual + actions * np.where(actions > 0, self._above, self._below))
         try:
-            return self.judge(self._carry_out(ids, self.control(wanted)))
-        except BaseException:  # the other insects may have taken the step or not
-            self._leave(ids)
-            self.begun = False
-            raise
+            return self.judge(self._fine.take(self._ids, control))
+        except Diverged as error:
+            time = float(self._done[error.start] * self._task.stride.dt)
+            raise walk_error(error, "acting", time, self._task.conditions) from None
 
     def check_begun(self) -> None:
         """Raise InputError unless all insects have begun and no step or reset has failed since."""
@@ -167,21 +150,26 @@ class Walkers:
         return self.begun and len(self._ids) == 0
 
     def control(self, wanted: np.ndarray) -> np.ndarray:
-        """Return the controls of the insects that walk for a step, (n, substep, actuator).
+        """Return the controls of the insects that walk for a step, (n, substep, actuator); `judge` ends the step.
 
         Args:
             wanted: values of their actions, (n, number) [rad] or [mm].
         """
-        self._plan_ahead()
+        self.begun = False  # if the step fails, the other insects may have taken it or not
+        for group in self._together:
+            self._plan(group)
         ids, offset, substeps = self._ids, self._task.actions == "tips", self._substeps
         tips = order(wanted, ids, self._ahead, self._passed[1], offset)
         if offset:
             joints, reachable = self._compiled.inverse(tips)
-            keep(joints, reachable, ids, self._joints, self._planned.missed)
+            self._planned.missed[ids] = substeps - reachable.sum(axis=1)
+            if not reachable.all():
+                hold(joints.swapaxes(0, 1), self._joints[ids])
+            self._joints[ids] = joints[:, -1]
             control = joints.reshape(len(ids), substeps, -1)
         else:
             control = wanted[:, np.newaxis].repeat(substeps, axis=1)
-        if self._grasps:
+        if self._task.conditions.grasp:
             stance = self._planned.stance[ids, np.newaxis]
             control = np.concatenate([control, stance.repeat(substeps, axis=1)], axis=2)
         return control
@@ -193,12 +181,13 @@ class Walkers:
         time, result = (self._done, self._steps), tuple(acted)
         any_over = judge(self._passed[0], ids, sensors, self._trunk, self._task.command, time, result)
         if self._ends:
-            feet, conditions = self.places.sensors[ids, self._compiled.columns.foot], self._task.conditions
-            beyond = beyond_the_ground(conditions, feet.reshape(-1, 6, 3)).any(axis=1)
+            feet = self.places.sensors[ids, self._compiled.columns.foot].reshape(-1, 6, 3)
+            beyond = beyond_the_ground(self._task.conditions, feet).any(axis=1)
             acted.truncated[ids] |= beyond & ~acted.terminated[ids]
-            any_over |= bool(acted.truncated.any())
+            any_over |= bool(beyond.any())
         if any_over:
             self._leave(np.flatnonzero(acted.terminated | acted.truncated))
+        self.begun = True
         return acted
 
     def observations(self) -> np.ndarray:
@@ -208,53 +197,31 @@ class Walkers:
 
     def _leave(self, ids: np.ndarray) -> None:
         """End the episodes of some insects."""
-        if len(ids) == 0:
-            return
         self._walking[ids] = False
         self._ids = np.flatnonzero(self._walking)
-        for group in {self._of.pop(i) for i in ids.tolist() if i in self._of}:
+        for group in self._together:
             still = self._walking[group.ids]
             group.ids, group.rows = group.ids[still], group.rows[still]
-            if not still.any():
-                self._together.remove(group)
-
-    def _plan_ahead(self) -> None:
-        """Plan the next steps of the groups that have none left."""
-        for group in self._together:
-            if group.ahead == 0:
-                self._plan(group)
-            group.ahead -= 1
+        self._together = [group for group in self._together if len(group.ids)]
 
     def _plan(self, group: Together) -> None:
-        ids, rows, steps = group.ids, group.rows, min(AHEAD, self._steps - group.plan.done)
-        if group.feedback:
-            state = self.places.qpos[ids], self.places.qvel[ids]
-            group.feedback.sense(replace(self._senses.sensed(ids, *state), ids=rows.copy()))
-            steps = 1
-        walk = advanced(group.plan, steps)
-        tips = group.targets.follow(walk, rows)
-        tips_ahead, stance_ahead, at = self._ahead
-        tips_ahead[ids, :steps] = tips.reshape(len(ids), steps, -1, 6, 3)
-        stance_ahead[ids, :steps] = walk.stance[:, rows].swapaxes(0, 1)
-        at[ids], group.ahead = 0, steps
+        """Plan the next steps of a group that has none left, and take one of them."""
+        if group.ahead == 0:
+            ids, steps = group.ids, min(AHEAD, self._steps - group.plan.done)
+            if isinstance(group.plan, FeedbackPlan):
+                sensed = self._senses.sensed(ids, self.places.qpos[ids], self.places.qvel[ids])
+                group.plan.sense(replace(sensed, ids=group.rows.copy()))
+                steps = 1
+            walk = advanced(group.plan, steps)
+            tips, stance, at = self._ahead
+            tips[ids, :steps] = group.targets.follow(walk, group.rows).reshape(len(ids), steps, -1, 6, 3)
+            stance[ids, :steps] = walk.stance[:, group.rows].swapaxes(0, 1)
+            at[ids], group.ahead = 0, steps
+        group.ahead -= 1
 
     def _nothing(self) -> Acted:
         """Return an empty result."""
         return Acted(np.zeros(self._count), *np.zeros((2, self._count), dtype=bool))
-
-    def _carry_out(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """Take one step of some insects."""
-        try:
-            return self._take(ids, control)
-        except Diverged as error:
-            time, conditions = float(self._done[error.start] * self._task.stride.dt), self._task.conditions
-            raise walk_error(error, "acting", time, conditions) from None
-
-    def _beyond(self, actions: np.ndarray, ids: np.ndarray) -> InputError:
-        """Return the error for an action out of bounds."""
-        row, i = np.argwhere(~(np.abs(actions[ids]) <= 1.0 + ROUNDING))[0]
-        name = action_names(self._compiled, self._task)[i]
-        return InputError(f"the action's {name} = {actions[ids[row], i]}; expected -1 to 1")
 
 
 class Alone:
@@ -265,13 +232,12 @@ class Alone:
 
     def __init__(self, compiled: CompiledBody, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Wrap a model and its data, which may be read and changed from outside."""
-        self.model, self.data, self._compiled, self._allowed = model, data, compiled, allowed_depth(compiled)
+        self.model, self.data, self._foot = model, data, compiled.columns.foot
         self.qpos, self.qvel = data.qpos[np.newaxis], data.qvel[np.newaxis]
         self.rotation = data.xmat[compiled.root].reshape(1, 3, 3)
         self.sensors = data.sensordata[np.newaxis]
         self._control, self._sensors, self._force = data.ctrl, data.sensordata, data.actuator_force
-        self._foot = compiled.columns.foot
-        self._warned, self._begun = data.warning.number, np.empty((1, mujoco.mj_stateSize(model, _STATE)))
+        self._warned, self._size = data.warning.number, mujoco.mj_stateSize(model, _STATE)
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
         """Put the body into a state, see `engine.Engine.put`."""
@@ -285,60 +251,35 @@ class Alone:
         self._control[:] = control[0]
         mujoco.mj_step1(self.model, self.data)
 
-    def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """Take one step of the plan; if a foot strikes the ground, by `substeps.FineSteps.take`."""
-        check_no_callbacks()
-        substeps = control.shape[1]
-        mujoco.mj_getState(self.model, self.data, self._begun[0], _STATE)
-        feet, sensors, force = self._roll(control[0], self.model)
-        if np.count_nonzero(strikes(self._compiled.depth(feet), substeps, self._allowed)):
-            self.put(ids, self._begun)
-            return FineSteps.of(self, substeps, self._compiled).take(ids, control)
-        return {"sensors": sensors, "force": force}
-
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """Take substeps, see `engine.Engine.roll`; neither torques nor states are stored."""
-        before = np.empty_like(self._begun)
-        mujoco.mj_getState(self.model, self.data, before[0], _STATE)
-        if parts == 1:
-            seen = self._roll(control[0], self.model)
-        else:
-            fine = copy(self.model)  # another thread may step with the model
-            fine.opt.timestep = self.model.opt.timestep / parts
-            fine.pair_solref[:, 0] = 2 * fine.opt.timestep
-            mujoco.mj_step1(fine, self.data)
-            seen = self._roll(control[0], fine)
-            mujoco.mj_step1(self.model, self.data)
-        nothing = np.empty((1, control.shape[1], 0))
-        return Rolled(before, *seen, torque=nothing, after=nothing)
-
-    def _roll(self, control: np.ndarray, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Take one step for each row of the controls, (step, actuator); return feet, sensors, force as in `Rolled`."""
-        count, data, now, pulled, warned = len(control), self.data, self._sensors, self._force, self._warned
-        sensors, force = np.empty((1, count + 1, len(now))), np.empty((1, count, len(pulled)))
-        try:
-            if warned.tobytes() == NEVER:
-                warned.fill(1)  # MuJoCo prints only the first warning of a kind
+        model, data, count = self.model, self.data, control.shape[1]
+        before, nothing = np.empty((1, self._size)), np.empty((1, count, 0))
+        sensors = np.empty((1, count + 1, len(self._sensors)))
+        force = np.empty((1, count, len(self._force)))
+        mujoco.mj_getState(model, data, before[0], _STATE)
+        with stepping():
+            if parts > 1:
+                model = copy(model)  # another thread may step with the model
+                model.opt.timestep /= parts
+                model.pair_solref[:, 0] = 2 * model.opt.timestep
+                mujoco.mj_step1(model, data)
             for k in range(count):
-                self._control[:] = control[k]
+                self._control[:] = control[0, k]
                 (mujoco.mj_step if k else mujoco.mj_step2)(model, data)
-                sensors[0, k], force[0, k] = now, pulled  # places at the beginning of the step
-            mujoco.mj_step1(model, data)
-        finally:
-            if well := warned.tobytes() == ONCE:
-                warned.fill(0)
-            else:
-                warned -= warned.min()  # 0 where MuJoCo has reset a body that diverged
-        sensors[0, count] = now
-        if not well:  # the next step sees a state that is not finite
-            raise self._diverged(control, model)
-        return sensors[:, :, self._foot].reshape(1, count + 1, 6, 3), sensors[:, :count], force
+                sensors[0, k], force[0, k] = self._sensors, self._force  # places at the beginning of the step
+            mujoco.mj_step1(self.model, data)
+        if self._warned.any():
+            raise self._diverged(control[0], model, before[0])
+        sensors[0, count] = self._sensors
+        feet = sensors[:, :, self._foot].reshape(1, count + 1, 6, 3)
+        return Rolled(before, feet, sensors[:, :count], force, torque=nothing, after=nothing)
 
-    def _diverged(self, control: np.ndarray, model: mujoco.MjModel) -> Diverged:
+    def _diverged(self, control: np.ndarray, model: mujoco.MjModel, state: np.ndarray) -> Diverged:
         """Return the error, with the state before and the controls since, (step, actuator)."""
         kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
         before = mujoco.MjData(model)
-        mujoco.mj_setState(model, before, self._begun[0], _STATE)
-        state = {name: getattr(before, name).copy() for name in (*STATE, "xfrc_applied")}
+        mujoco.mj_setState(model, before, state, _STATE)
+        saved = {name: getattr(before, name).copy() for name in (*STATE, "xfrc_applied")}
         now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
-        return Diverged(0, ", ".join(kinds) or "a state that is not finite", state | now)
+        return Diverged(0, ", ".join(kinds), saved | now)
