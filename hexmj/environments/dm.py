@@ -171,7 +171,7 @@ class Walking(control.Task):
     def get_reward(self, physics: InsectPhysics) -> float:
         """Return the reward, see `task`."""
         body = physics.alone
-        return 0.0 if self._acted.terminated else worth(body.qvel[0], body.rotation[0], self.task.command)
+        return 0.0 if self._acted.terminated else float(worth(body.qvel, body.rotation, self.task.command)[0])
 
     def get_termination(self, physics: InsectPhysics) -> float | None:
         """Return discount 0 on a fall, 1 at the end of time or ground, and None before."""

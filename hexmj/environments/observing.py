@@ -78,33 +78,6 @@ class Observer:
 
 
 @jitted
-def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
-    """Return the tip targets of some insects for their next step, (n, substep, leg, axis) [mm].
-
-    Args:
-        wanted: values of their actions, (n, number).
-        ids: insects, (n,).
-        ahead: planned tips (insect, step, substep, leg, axis), stance (insect, step, leg), and the index of the next
-            step, (insect,), which is advanced.
-        planned: `Planned` of all insects; its stance and tips are updated.
-        offset: whether actions are offsets to the tips.
-    """
-    tips_ahead, stance_ahead, at = ahead
-    tips = np.empty((len(ids), tips_ahead.shape[2], 6, 3))
-    for i, n in enumerate(ids):
-        step = at[n]
-        for leg in range(6):
-            planned[0][n, leg] = stance_ahead[n, step, leg]
-            for axis in range(3):
-                beside = wanted[i, 3 * leg + axis] if offset else 0.0
-                for sub in range(tips.shape[1]):
-                    tips[i, sub, leg, axis] = tips_ahead[n, step, sub, leg, axis] + beside
-                planned[1][n, leg, axis] = tips_ahead[n, step, tips.shape[1] - 1, leg, axis]
-        at[n] = step + 1
-    return tips
-
-
-@jitted
 def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any) -> None:
     """Write all observations into `flat`, (n, number), clipped at their bounds.
 
@@ -182,37 +155,12 @@ def _clearance(q: Any, turn: Any, corners: Any) -> float:
     return lowest
 
 
-@jitted
-def judge(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time: Any, result: Any) -> bool:
-    """Compute rewards and ends of the insects that took a step.
+def worth(qvel: np.ndarray, rotation: np.ndarray, command: float) -> np.ndarray:
+    """Return the reward of a step without a fall, max(0, 1 - |v - c| / c) max(0, u), of insects in their states now.
 
     Args:
-        places: `Places` of all insects after the step.
-        ids: insects that took the step, (n,).
-        sensors: at the beginning of each substep, (n, substep, column).
-        trunk: first column of the contacts of the trunk's parts, and the one after the last.
+        qvel: (n, velocity).
+        rotation: from the root frames to the world, (n, axis, axis).
         command: commanded velocity [mm/s].
-        time: steps that all insects have taken, (insect,), which are advanced, and the steps of an episode.
-        result: rewards, falls and ends of time, each (insect,), filled with 0 before; updated.
-
-    Returns:
-        Whether any episode has ended.
     """
-    (_, qvel, rotation, now), (done, steps), (reward, fell, over), any_over = places, time, result, False
-    for i, n in enumerate(ids):
-        done[n] += 1
-        for column in range(trunk[0], trunk[1]):
-            fell[n] |= now[n, column] > 0
-            for t in range(sensors.shape[1]):
-                fell[n] |= sensors[i, t, column] > 0
-        over[n] = done[n] == steps and not fell[n]
-        if not fell[n]:
-            reward[n] = worth(qvel[n], rotation[n], command)
-        any_over |= fell[n] or over[n]
-    return any_over
-
-
-@jitted
-def worth(qvel: Any, rotation: Any, command: float) -> float:
-    """Return the reward of a step without a fall, max(0, 1 - |v - c| / c) max(0, u), of one insect in its state now."""
-    return max(1.0 - abs(qvel[0] - command) / command, 0.0) * max(rotation[2, 2], 0.0)
+    return np.maximum(1.0 - np.abs(qvel[:, 0] - command) / command, 0.0) * np.maximum(rotation[:, 2, 2], 0.0)

@@ -17,7 +17,7 @@ from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.bodies.kinematics import standing_tips
 from hexmj.controllers.planning import advanced, begin
 from hexmj.controllers.protocol import FeedbackPlan, Plan
-from hexmj.environments.observing import Observer, Places, Planned, judge, order
+from hexmj.environments.observing import Observer, Places, Planned, worth
 from hexmj.environments.task import Task, action_bounds
 from hexmj.errors import InputError
 from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, stepping, walk_error
@@ -84,7 +84,6 @@ class Walkers:
         low, self._usual, high = action_bounds(compiled, task)
         self._below, self._above = self._usual - low, high - self._usual
         self.observer = Observer(compiled, task)
-        self._trunk = compiled.columns.trunk.start, compiled.columns.trunk.stop
         self.look(bodies)
 
     def look(self, bodies: Bodies) -> None:
@@ -158,11 +157,15 @@ class Walkers:
         self.begun = False  # if the step fails, the other insects may have taken it or not
         for group in self._together:
             self._plan(group)
-        ids, offset, substeps = self._ids, self._task.actions == "tips", self._substeps
-        tips = order(wanted, ids, self._ahead, self._passed[1], offset)
-        if offset:
+        ids, substeps, planned = self._ids, self._substeps, self._planned
+        tips_ahead, stance_ahead, at = self._ahead
+        step = at[ids]
+        tips, planned.stance[ids], at[ids] = tips_ahead[ids, step], stance_ahead[ids, step], step + 1
+        planned.tips[ids] = tips[:, -1]
+        if self._task.actions == "tips":
+            tips += wanted.reshape(-1, 1, 6, 3)
             joints, reachable = self._compiled.inverse(tips)
-            self._planned.missed[ids] = substeps - reachable.sum(axis=1)
+            planned.missed[ids] = substeps - reachable.sum(axis=1)
             if not reachable.all():
                 hold(joints.swapaxes(0, 1), self._joints[ids])
             self._joints[ids] = joints[:, -1]
@@ -170,23 +173,25 @@ class Walkers:
         else:
             control = wanted[:, np.newaxis].repeat(substeps, axis=1)
         if self._task.conditions.grasp:
-            stance = self._planned.stance[ids, np.newaxis]
+            stance = planned.stance[ids, np.newaxis]
             control = np.concatenate([control, stance.repeat(substeps, axis=1)], axis=2)
         return control
 
     def judge(self, shown: Shown) -> Acted:
         """Return the result of a step, from its sensors and forces, (n, substep, ...)."""
-        ids, acted, sensors = self._ids, self._nothing(), shown["sensors"]
-        self._senses.feel(ids, sensors, shown["force"])
-        time, result = (self._done, self._steps), tuple(acted)
-        any_over = judge(self._passed[0], ids, sensors, self._trunk, self._task.command, time, result)
+        ids, acted, columns = self._ids, self._nothing(), self._compiled.columns
+        self._senses.feel(ids, shown["sensors"], shown["force"])
+        now = self.places.sensors[ids]
+        fell = (shown["sensors"][:, :, columns.trunk] > 0).any(axis=(1, 2)) | (now[:, columns.trunk] > 0).any(axis=1)
+        self._done[ids] += 1
+        over = self._done[ids] == self._steps
         if self._ends:
-            feet = self.places.sensors[ids, self._compiled.columns.foot].reshape(-1, 6, 3)
-            beyond = beyond_the_ground(self._task.conditions, feet).any(axis=1)
-            acted.truncated[ids] |= beyond & ~acted.terminated[ids]
-            any_over |= bool(beyond.any())
-        if any_over:
-            self._leave(np.flatnonzero(acted.terminated | acted.truncated))
+            over |= beyond_the_ground(self._task.conditions, now[:, columns.foot].reshape(-1, 6, 3)).any(axis=1)
+        acted.terminated[ids], acted.truncated[ids] = fell, over & ~fell
+        reward = worth(self.places.qvel[ids], self.places.rotation[ids], self._task.command)
+        acted.reward[ids] = np.where(fell, 0.0, reward)
+        if (ended := fell | over).any():
+            self._leave(ids[ended])
         self.begun = True
         return acted
 
