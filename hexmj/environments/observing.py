@@ -1,7 +1,6 @@
-"""Observations and rewards of all insects at once, in compiled passes.
+"""Observations and rewards of all insects at once.
 
-For one insect a dozen calls of NumPy take as long as its physics. `tests/plain_observations.py` has the same formulas
-in plain NumPy, and a test compares the two.
+`tests/plain_observations.py` has the same formulas in plain NumPy, and a test compares the two.
 """
 
 from typing import Any, NamedTuple
@@ -11,7 +10,7 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.body import ROOT_QPOS, ROOT_QVEL
 from hexmj.environments.task import Task, observation_bounds
-from hexmj.jitted import jitted, part
+from hexmj.jitted import jitted
 from hexmj.stability import margins
 
 
@@ -44,29 +43,29 @@ class Observer:
 
     def __init__(self, compiled: CompiledBody, task: Task) -> None:
         """Prepare the layout of the observations, which `task` describes."""
-        bounds, columns = observation_bounds(compiled, task), compiled.columns
-        self._bounds = np.array([np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1)])
-        self._corners, no_foot = compiled.trunk_corners, compiled.body.lengths.no_foot_margin
-        self._layout = compiled.joints, columns.foot.start, columns.centre_of_mass.start, task.command, no_foot
+        self._compiled, self._command = compiled, task.command
+        bounds = observation_bounds(compiled, task)
+        self._low, self._high = (np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1))
         ends = np.cumsum([low.size for low, _ in bounds.values()]).tolist()
         self._fields = [
             (name, (..., slice(end - low.size, end)), low.shape if low.ndim > 1 else ())
             for (name, (low, _)), end in zip(bounds.items(), ends, strict=True)
         ]
 
-    def observe(
-        self, places: tuple[np.ndarray, ...], standing: np.ndarray, planned: tuple[np.ndarray, ...]
-    ) -> np.ndarray:
-        """Return all observations of some insects, (n, number).
-
-        Args:
-            places: `Places` as a plain tuple, which compiled code receives faster.
-            standing: feet that stand, (n, leg).
-            planned: `Planned` as a plain tuple.
-        """
-        flat = np.empty((len(standing), self._bounds.shape[1]))
-        observe(places, self._corners, standing, planned, self._bounds, self._layout, flat)
-        return flat
+    def observe(self, places: Places, standing: np.ndarray, planned: Planned) -> np.ndarray:
+        """Return all observations of some insects, (n, number); `standing` are feet that stand, (n, leg)."""
+        qpos, qvel, rotation, sensors = places
+        count, columns, lengths = len(standing), self._compiled.columns, self._compiled.body.lengths
+        feet = sensors[:, columns.foot].reshape(count, 6, 3)
+        margin, relative = np.empty(count), np.empty((count, 22))
+        margins(feet[:, :, :2] - sensors[:, np.newaxis, columns.centre_of_mass][:, :, :2], standing, margin)
+        measure(qpos, qvel, rotation, feet, *self._compiled.trunk_corners, relative)
+        parts = (
+            qpos[:, columns.qpos], qvel[:, columns.qvel], qpos[:, 3:ROOT_QPOS], relative[:, :3], qvel[:, 3:ROOT_QVEL],
+            relative[:, 3:], standing, np.maximum(margin, lengths.no_foot_margin)[:, np.newaxis],
+            np.full((count, 1), self._command), planned.stance, planned.tips.reshape(count, 18), planned.missed,
+        )  # fmt: skip
+        return np.concatenate(parts, axis=1)[:, : len(self._low)].clip(self._low, self._high)
 
     def named(self, flat: np.ndarray) -> dict[str, np.ndarray]:
         """Return observations, (..., number), by name and in their shapes."""
@@ -78,81 +77,30 @@ class Observer:
 
 
 @jitted
-def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any) -> None:
-    """Write all observations into `flat`, (n, number), clipped at their bounds.
+def measure(qpos: Any, qvel: Any, rotation: Any, feet: Any, corners: Any, radii: Any, relative: Any) -> None:
+    """Write velocity along the heading, clearance, and tips in the root frame into `relative`, (n, 3 + 1 + leg * axis).
 
     Args:
-        places: `Places` of the insects.
-        corners: of the trunk, (corner, axis), and their radii, (corner,) [mm].
-        standing: feet that stand, (n, leg).
-        planned: stance (n, leg), tips (n, leg, axis), and substeps out of reach (n, leg).
-        bounds: least and greatest value of every number, (2, number).
-        layout: number of joints, first sensor columns of feet and centre of mass, the command, and the margin without
-            a foot in contact.
+        qpos, qvel, rotation: as in `Places`.
+        feet: in the world, (n, leg, axis) [mm].
+        corners: of the trunk in the root frame, (corner, axis) [mm].
+        radii: of the trunk at its corners, (corner,) [mm].
+        relative: filled.
     """
-    qpos, qvel, rotation, sensors = places
-    stance, tips, missed = planned
-    joints, foot, centre, command, no_foot = layout
-    feet, margin = np.empty((1, 6, 2)), np.empty(1)
-    for n in range(len(flat)):
-        seen, turn, q, s = flat[n], rotation[n], qpos[n], sensors[n]
-        at = _observe_root(q, qvel[n], turn, joints, seen)
-        seen[at] = _clearance(q, turn, corners)
-        at += 1
+    for n in range(len(relative)):
+        seen, turn, v = relative[n], rotation[n], qvel[n]
+        angle = np.arctan2(turn[1, 0], turn[0, 0])
+        cosine, sine = np.cos(angle), np.sin(angle)
+        seen[0], seen[1], seen[2] = cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2]
+        seen[3] = np.inf
+        for c in range(len(corners)):
+            up = turn[2, 0] * corners[c, 0] + turn[2, 1] * corners[c, 1] + turn[2, 2] * corners[c, 2]
+            seen[3] = min(seen[3], qpos[n, 2] + up - radii[c])
         for leg in range(6):
-            tip = s[foot + 3 * leg : foot + 3 * leg + 3]
             for k in range(3):
-                seen[at + k] = 0.0
+                seen[4 + 3 * leg + k] = 0.0
                 for axis in range(3):
-                    seen[at + k] += (tip[axis] - q[axis]) * turn[axis, k]
-            at += 3
-            feet[0, leg, 0], feet[0, leg, 1] = tip[0] - s[centre], tip[1] - s[centre + 1]
-        for leg in range(6):
-            seen[at + leg] = standing[n, leg]
-        margins(feet, standing[n : n + 1], margin)
-        seen[at + 6] = max(margin[0], no_foot)
-        seen[at + 7] = command
-        at += 8
-        for leg in range(6):
-            seen[at + leg] = stance[n, leg]
-            for k in range(3):
-                seen[at + 6 + 3 * leg + k] = tips[n, leg, k]
-        at += 24
-        for i in range(at, len(seen)):
-            seen[i] = missed[n, i - at]
-        for i in range(len(seen)):
-            seen[i] = min(max(seen[i], bounds[0, i]), bounds[1, i])
-
-
-@part
-def _observe_root(q: Any, v: Any, turn: Any, joints: int, seen: Any) -> int:
-    """Write joints, orientation and velocities into the first numbers of `seen`, and return their count."""
-    for j in range(joints):
-        seen[j] = q[ROOT_QPOS + j]
-        seen[joints + j] = v[ROOT_QVEL + j]
-    at = 2 * joints
-    for k in range(4):
-        seen[at + k] = q[3 + k]
-    at += 4
-    angle = np.arctan2(turn[1, 0], turn[0, 0])
-    cosine, sine = np.cos(angle), np.sin(angle)
-    seen[at] = cosine * v[0] + sine * v[1]
-    seen[at + 1] = cosine * v[1] - sine * v[0]
-    seen[at + 2] = v[2]
-    for k in range(3):
-        seen[at + 3 + k] = v[3 + k]
-    return at + 6
-
-
-@part
-def _clearance(q: Any, turn: Any, corners: Any) -> float:
-    """Return the height of the trunk's lowest corner [mm]."""
-    lowest = np.inf
-    for c in range(len(corners[0])):
-        corner = corners[0][c]
-        up = turn[2, 0] * corner[0] + turn[2, 1] * corner[1] + turn[2, 2] * corner[2]
-        lowest = min(lowest, q[2] + up - corners[1][c])
-    return lowest
+                    seen[4 + 3 * leg + k] += (feet[n, leg, axis] - qpos[n, axis]) * turn[axis, k]
 
 
 def worth(qvel: np.ndarray, rotation: np.ndarray, command: float) -> np.ndarray:

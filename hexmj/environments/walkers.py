@@ -90,7 +90,6 @@ class Walkers:
         """Refer to the arrays of these bodies, which change with each step."""
         self.bodies, self.places = bodies, Places(bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors)
         self._fine = FineSteps.of(bodies, self._substeps, self._compiled)
-        self._passed = tuple(self.places), tuple(self._planned)  # compiled code receives plain tuples faster
 
     def begin(self, ids: np.ndarray, starts: np.ndarray) -> None:
         """Begin episodes of some insects, (n,), at starts, (n, leg) [mm]; the first call is for all insects.
@@ -197,8 +196,7 @@ class Walkers:
 
     def observations(self) -> np.ndarray:
         """Return the observations of all insects, (insect, number); `observer.named` names them."""
-        places, planned = self._passed
-        return self.observer.observe(places, self._senses.standing(), planned)
+        return self.observer.observe(self.places, self._senses.standing(), self._planned)
 
     def _leave(self, ids: np.ndarray) -> None:
         """End the episodes of some insects."""
