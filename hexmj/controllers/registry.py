@@ -2,20 +2,19 @@
 
 import re
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Iterator
+from dataclasses import is_dataclass, replace
 from enum import Enum
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from types import ModuleType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
 from hexmj.controllers.baselines import BASELINES
-from hexmj.controllers.baselines.evolved import EVOLVED, FOUND, Evolved
+from hexmj.controllers.baselines.evolved import EVOLVED, FOUND
 from hexmj.controllers.cruse1998 import PRESETS, Cruse1998, own_tables, read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
@@ -26,11 +25,8 @@ from hexmj.validate import short
 ENTRY_POINTS = "hexmj.controllers"
 """Group of the entry points by which other packages provide controllers: a name and `module:object`."""
 
-VARIED = re.compile(r"(?P<name>.+)-(?P<how>without|with)-(?P<which>\d)")
-"""Name of a controller without, or with, one of its mechanisms or rules, such as ldvs-without-3."""
-
-PART = re.compile(r"(-(without|with)-\d)+$")
-"""End of such a name."""
+VARIED = re.compile(r"(?P<name>.+?)(?P<parts>(-(without|with)-\d)+)")
+"""Name of a controller without, or with, some of its mechanisms or rules, such as ldvs-without-3."""
 
 
 def load_controller(name: str) -> Controller:
@@ -47,32 +43,28 @@ def load_controller(name: str) -> Controller:
     Raises:
         InputError: there is no such name, file, module or object, or the object is no controller.
     """
-    if name in PRESETS:
-        return PRESETS[name]
-    if name in BASELINES:
-        return BASELINES[name]
-    if _is_object(name):
-        where, _, what = name.rpartition(":")
-        return _object(_module(where), what, name)
+    if name in PRESETS or name in BASELINES:
+        return PRESETS.get(name) or BASELINES[name]
+    where, _, what = name.rpartition(":")
+    if where and what.isidentifier():
+        return _object(where, what, name)
     for point in entry_points(group=ENTRY_POINTS, name=name):
-        return _object(import_module(point.module), point.attr, name)
+        return _object(point.module, point.attr, name)
     if varied := VARIED.fullmatch(name):
-        return _varied(load_controller(varied["name"]), varied["how"], int(varied["which"]))
-    path = Path(name)
-    if path.suffix == ".py" and path.is_file():
-        return _object(_module(name), "", name)
-    if not path.is_file():
-        raise InputError(
-            f"controller {name!r} is neither a file nor one of {', '.join(known_names())}; expected such a name,"
-            " file.toml, file.py:object or module:object"
-        )
-    table = read_toml(path)
-    table.pop(SEARCHED, None)
-    if "controller" not in table:
-        return read_network(table, name, path.stem)
-    if table.keys() - {"controller", "fields"}:
-        raise InputError(f"{path} holds {', '.join(table)}; expected controller and a table [fields]")
-    return _from_table(path, str(table["controller"]), table.get("fields", {}))
+        controller: Any = load_controller(varied["name"])
+        for how, which in re.findall(r"-(without|with)-(\d)", varied["parts"]):
+            change = getattr(controller, {"without": "without", "with": "having"}[how], None)
+            if change is None:
+                raise InputError(f"{controller.name} has no mechanisms or rules to be switched: {name}")
+            controller = change(int(which))
+        return controller
+    if file := parameter_file(name):
+        table = {key: value for key, value in read_toml(file).items() if key != SEARCHED}
+        return _from_table(file, table) if "controller" in table else read_network(table, name, file.stem)
+    raise InputError(
+        f"controller {name!r} is neither a file nor one of {', '.join(known_names())}; expected such a name,"
+        " file.toml, file.py:object or module:object"
+    )
 
 
 def known_names() -> Iterator[str]:
@@ -82,8 +74,7 @@ def known_names() -> Iterator[str]:
 
 def parameter_file(name: str) -> Path | None:
     """Return the TOML file that a controller's name means, or None if it means something else."""
-    means_other = VARIED.fullmatch(name) or _is_object(name) or name.endswith(".py") or name in known_names()
-    return Path(name) if not means_other and Path(name).is_file() else None
+    return Path(name) if name.endswith(".toml") and Path(name).is_file() else None
 
 
 def searched_on(name: str, controller: Controller) -> dict[str, list[int]]:
@@ -97,48 +88,29 @@ def searched_on(name: str, controller: Controller) -> dict[str, list[int]]:
         Name of the search's result -> seeds of the starts of its search, and of those that it continued. Our own weight
         sets are recognised under any name, and without some of their mechanisms.
     """
-    base = PART.sub("", name)
-    names = [base] if base in PRESETS else []
-    if isinstance(controller, Cruse1998):
-        weights = plain(controller.weights)
-        names += [preset for preset, usual in PRESETS.items() if plain(usual.weights) == weights]
-    tables = {preset: own_tables().get(preset, {}) for preset in names}
-    if base == EVOLVED.name or (isinstance(controller, Evolved) and controller == EVOLVED):
+    varied = VARIED.fullmatch(name)
+    base = varied["name"] if varied else name
+    weights = plain(controller.weights) if isinstance(controller, Cruse1998) else None
+    tables = {own: table for own, table in own_tables().items() if base == own or weights == plain(PRESETS[own].weights)}
+    if base == EVOLVED.name or controller == EVOLVED:
         tables[EVOLVED.name] = read_toml(FOUND)
-    elif file := parameter_file(base):
+    if file := parameter_file(base):
         tables[base] = read_toml(file)
     return {found: table[SEARCHED]["seeds"] for found, table in tables.items() if SEARCHED in table}
 
 
-def _is_object(name: str) -> bool:
-    """Whether a name means an object in a module or file."""
-    where, _, what = name.rpartition(":")
-    return bool(where) and what.isidentifier()
-
-
-def _varied(controller: Any, how: str, which: int) -> Controller:
-    """Return a controller without, or with, a mechanism or rule."""
-    change = getattr(controller, "without" if how == "without" else "having", None)
-    if change is None:
-        raise InputError(f"{controller.name} has no mechanisms or rules to be switched {how} -{how}-{which}")
-    return change(which)
-
-
-def _object(module: ModuleType, what: str, name: str) -> Controller:
-    """Return an object of a module, or an instance of a class with its defaults."""
+def _object(where: str, what: str, name: str) -> Controller:
+    """Return an object of a module or file, or an instance of a class with its defaults."""
+    module = _module(where)
     found: Any = getattr(module, what, None)
     if found is None:
         offered = [key for key, value in vars(module).items() if is_dataclass(value) and hasattr(value, "begin")]
         raise InputError(f"controller {name!r} is not found; controllers there: {', '.join(offered) or 'none'}")
-    if isinstance(found, type):
-        try:
-            found = found()
-        except TypeError as error:
-            raise InputError(f"controller {name!r} needs defaults for all fields: {error}") from error
     try:
+        found = found() if isinstance(found, type) else found
         check_controller_type(found)
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+    except (InputError, TypeError) as error:  # a field without a default
+        raise InputError(f"{name}: {error}") from error
     return found
 
 
@@ -159,75 +131,40 @@ def _module(where: str) -> ModuleType:
     return module
 
 
-def _from_table(path: Path, name: str, values: dict[str, Any]) -> Controller:
+def _from_table(path: Path, table: dict[str, Any]) -> Controller:
     """Return the controller that a file names with the fields that it gives, named like the file by default."""
-    if Path(name).suffix == ".toml":
-        raise InputError(f"{path}: controller = {name!r}; expected a controller that is no TOML file")
-    found: Any = load_controller(name)
-    if values and any(field.name == "name" and field.init for field in fields(found)):
+    if unknown := table.keys() - {"controller", "fields"}:
+        raise InputError(f"{path} holds {', '.join(unknown)}; expected controller and a table [fields]")
+    usual: Any = load_controller(table["controller"])
+    values = table.get("fields", {})
+    if values and "name" in usual.__dataclass_fields__:
         values = {"name": path.stem} | values
     try:
-        return _made(type(found), found, values)
-    except InputError as error:
+        return _changed(usual, values)
+    except (ValueError, TypeError, KeyError) as error:
         raise InputError(f"{path} [fields]: {error}") from None
 
 
-def _made(kind: type, usual: Any, values: dict[str, Any]) -> Any:
-    """Return a dataclass with values of a TOML table; the others are those of `usual`, or the class's defaults."""
-    names = [field.name for field in fields(kind) if field.init]
-    if unknown := values.keys() - set(names):
-        raise InputError(f"unknown field {min(unknown)}; valid names: {', '.join(names)}")
-    hints: dict[str, Any] = {}
-    with suppress(NameError):  # of an annotation that only type checkers know
-        hints = get_type_hints(kind)
-    changed = {
-        name: _converted(name, value, hints.get(name), getattr(usual, name, None)) for name, value in values.items()
-    }
-    try:
-        return replace(usual, **changed) if isinstance(usual, kind) else kind(**changed)
-    except TypeError as error:
-        raise InputError(str(error)) from error
+def _changed(usual: Any, values: dict[str, Any]) -> Any:
+    """Return a dataclass with values of a TOML table, each of the type of the usual value.
 
-
-def _converted(name: str, value: Any, kind: Any, usual: Any = None) -> Any:
-    """Convert a TOML value to the annotated type of a field.
-
-    Numbers, texts, `Literal`, unions, tuples, enumerations (by name or value), paths, arrays and dataclasses (tables)
-    are converted or refused; values for other types are returned as they are.
+    A member of an enumeration is given by its name, a tuple by a list, and a dataclass by a table of changed fields.
     """
-    origin, inner = get_origin(kind), get_args(kind)
-    if kind in (bool, int, float, str):
-        if type(value) is kind or (kind is float and type(value) is int):
-            return kind(value)
-    elif origin is Literal:
-        if any(value == option and type(value) is type(option) for option in inner):
-            return value
-    elif origin in (Union, UnionType):
-        for option in sorted(inner, key=lambda option: not (isinstance(option, type) and isinstance(usual, option))):
-            with suppress(InputError):
-                return _converted(name, value, option, usual)
-    elif kind is type(None):
-        if value is None:
-            return None
-    elif kind is tuple or origin in (tuple, list, Sequence):
-        if isinstance(value, list):
-            of = inner if origin is tuple and Ellipsis not in inner else (inner or (None,))[:1] * len(value)
-            if len(of) == len(value):
-                items = [_converted(name, item, option) for item, option in zip(value, of, strict=True)]
-                return items if origin is list else tuple(items)
-    elif np.ndarray in (kind, origin):
-        if isinstance(value, list):
-            return np.array(value, dtype=usual.dtype if isinstance(usual, np.ndarray) else None)
-    elif isinstance(kind, type) and issubclass(kind, Enum):
-        for member in kind:
-            if value in (member.name, member.value):
-                return member
-    elif isinstance(kind, type) and issubclass(kind, Path):
-        if isinstance(value, str):
-            return kind(value)
-    elif isinstance(kind, type) and is_dataclass(kind):
-        if isinstance(value, dict):
-            return _made(type(usual) if isinstance(usual, kind) else kind, usual, value)
-    else:
-        return value
-    raise InputError(f"{name} = {short(value)}; expected {kind}")
+    changes = {}
+    for name, value in values.items():
+        match getattr(usual, name, None):
+            case Enum() as old:
+                changes[name] = type(old)[value]
+            case tuple() | Path() as old:
+                changes[name] = type(old)(value)
+            case np.ndarray() as old:
+                changes[name] = np.array(value, dtype=old.dtype)
+            case old if is_dataclass(old) and isinstance(value, dict):
+                changes[name] = _changed(old, value)
+            case int() | float() as old if not isinstance(old, bool) and type(value) in (int, float):
+                changes[name] = float(value) if isinstance(old, float) else value
+            case old if old is None or type(value) is type(old):
+                changes[name] = value
+            case old:
+                raise InputError(f"{name} = {short(value)}; expected a value like {short(old)}")
+    return replace(usual, **changes)
