@@ -91,7 +91,9 @@ def searched_on(name: str, controller: Controller) -> dict[str, list[int]]:
     varied = VARIED.fullmatch(name)
     base = varied["name"] if varied else name
     weights = plain(controller.weights) if isinstance(controller, Cruse1998) else None
-    tables = {own: table for own, table in own_tables().items() if base == own or weights == plain(PRESETS[own].weights)}
+    tables = {
+        own: table for own, table in own_tables().items() if base == own or weights == plain(PRESETS[own].weights)
+    }
     if base == EVOLVED.name or controller == EVOLVED:
         tables[EVOLVED.name] = read_toml(FOUND)
     if file := parameter_file(base):

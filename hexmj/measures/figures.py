@@ -88,11 +88,13 @@ def network_rules(controller: Any) -> str:
         return network_rules(controller["controller"])
     if not {"order", "model_variant"} <= controller.keys():
         return ""
-    from hexmj.controllers.cruse1998 import ModelVariant, in_words
+    from hexmj.controllers.cruse1998 import ModelVariant, variant_name
 
     variant = ModelVariant(**controller["model_variant"])
     order = f"{controller['order']} order" if controller["order"] != "printed" else ""
-    return ", ".join(filter(None, [order, f"model variant {in_words(variant)}" if variant != ModelVariant() else ""]))
+    return ", ".join(
+        filter(None, [order, f"model variant {variant_name(variant)}" if variant != ModelVariant() else ""])
+    )
 
 
 def comparison_figure(result: "xr.Dataset") -> "Figure":

@@ -10,16 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from hexmj.controllers.cruse1998 import Cruse1998, ModelVariant, Order
-from hexmj.controllers.cruse1998.weights import (
-    BINARY,
-    NEIGHBOURS,
-    AnyWeights,
-    Symmetric,
-    Weights,
-    general,
-    names_of,
-    pairs,
-)
+from hexmj.controllers.cruse1998.weights import BINARY, AnyWeights, Symmetric, Weights, general
+from hexmj.controllers.cruse1998.weights import PLACES as ALL
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError
@@ -29,17 +21,16 @@ from hexmj.validate import choice
 
 FormName = Literal["hws", "ldvs", "mirrored", "general"]
 
-_ALL = [(kind, pair) for kind in NEIGHBOURS for pair in pairs(kind)]
 _SYMMETRIC = tuple(one.name for one in fields(Symmetric))
 
-PLACES = {"mirrored": [(kind, pair) for kind, pair in _ALL if pair[0] < 3], "general": _ALL}
+PLACES = {"mirrored": [(kind, (d, e)) for kind, (d, e) in ALL if d < 3], "general": ALL}
 """Forms of general weights -> kind, destination and source leg of each parameter."""
 
 FORMS: dict[FormName, tuple[str, ...]] = {
     "hws": tuple(name for name in _SYMMETRIC if name != "p34_i"),
     "ldvs": _SYMMETRIC,
-    "mirrored": names_of(PLACES["mirrored"]),
-    "general": names_of(PLACES["general"]),
+    "mirrored": tuple(f"{kind} {d + 1},{e + 1}" for kind, (d, e) in PLACES["mirrored"]),
+    "general": tuple(f"{kind} {d + 1},{e + 1}" for kind, (d, e) in ALL),
 }
 """Forms of the 1998 network -> names of their parameters, in the order of the vector."""
 
@@ -174,7 +165,7 @@ class NetworkForm:
 
     def _weights(self, vector: np.ndarray) -> AnyWeights:
         if self.name not in PLACES:
-            return Symmetric.from_vector(vector)
+            return Symmetric(**dict(zip(self.names, vector.tolist(), strict=True)))
         numbers = dict(zip(PLACES[self.name], vector, strict=True))
         if self.name == "mirrored":
             numbers |= {(kind, (MIRROR[d], MIRROR[e])): value for (kind, (d, e)), value in numbers.items()}

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args, get_type_hints
 import numpy as np
 
 import hexmj.controllers.cruse1998.kernel as kernel
-from hexmj.controllers.cruse1998.weights import NEIGHBOURS, AnyWeights, Symmetric, Weights, general, pairs
+from hexmj.controllers.cruse1998.weights import NEIGHBOURS, PLACES, AnyWeights, Symmetric, Weights, general
 from hexmj.controllers.planning import planned_losses
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
@@ -71,23 +71,12 @@ def named_variant(name: str) -> ModelVariant:
 
 
 def variant_name(model_variant: ModelVariant) -> str:
-    """Return the name of a model variant.
-
-    Raises:
-        InputError: it has no name.
-    """
+    """Return the name of a model variant, or its choices that are not as printed, such as 'cap sum, neutral final'."""
     for name, named in MODEL_VARIANTS.items():
         if named == model_variant:
             return name
-    raise InputError(f"{model_variant} has no name; expected one of {', '.join(MODEL_VARIANTS)}")
-
-
-def in_words(model_variant: ModelVariant) -> str:
-    """Return the name of a model variant, or its choices that are not as printed, such as 'cap sum, neutral final'."""
-    if model_variant in MODEL_VARIANTS.values():
-        return variant_name(model_variant)
-    chosen = [(field.name, getattr(model_variant, field.name)) for field in fields(ModelVariant)]
-    return ", ".join(f"{name} {value}" for name, value in chosen if value != getattr(ModelVariant, name))
+    chosen = {field.name: getattr(model_variant, field.name) for field in fields(ModelVariant)}
+    return ", ".join(f"{name} {value}" for name, value in chosen.items() if value != getattr(ModelVariant, name))
 
 
 @dataclass(frozen=True)
@@ -141,34 +130,20 @@ class Cruse1998:
         if isinstance(old, Symmetric):
             changed = replace(old, **{key: value for key in asdict(old) if key.partition("_")[0] in kinds})
         else:
-            given = {(kind, pair): getattr(old, kind)[pair] for kind in NEIGHBOURS for pair in pairs(kind)}
-            changed = Weights.of({key: value if key[0] in kinds else weight for key, weight in given.items()})
+            weights = {(kind, pair): getattr(old, kind)[pair] for kind, pair in PLACES}
+            changed = Weights.of({place: value if place[0] in kinds else weights[place] for place in PLACES})
         if np.array_equal(general(changed).to_vector(), general(old).to_vector()):
             raise InputError(f"{name} equals {self.name}; expected a mechanism that changes the weights")
         return replace(self, weights=changed, name=name)
 
-    def begin(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> "NetworkPlan":
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> "NetworkPlan":
         """See `protocol.Controller.begin`."""
         x = checked_starts(starts, stride)
         final = checked_velocities(velocity, len(x), acceleration)
         slow = np.full(len(x), acceleration.start) if acceleration else final
         return NetworkPlan(x, stride, self._constants(stride, acceleration), slow, slow, final, threads)
 
-    def begin_at_speed(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> "NetworkPlan":
+    def begin_at_speed(self, starts, velocity, stride, acceleration=None, threads=None) -> "NetworkPlan":
         """See `protocol.SteerableController.begin_at_speed`."""
         plan = self.begin(starts, velocity, stride, acceleration, threads)
         return replace(plan, first=plan.final)

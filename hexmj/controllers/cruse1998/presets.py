@@ -1,6 +1,5 @@
 """Networks by name: the paper's weight sets and our own, and parameter files (TOML)."""
 
-import math
 from dataclasses import asdict, fields
 from functools import cache
 from pathlib import Path
@@ -12,13 +11,14 @@ from hexmj.controllers.cruse1998.weights import (
     LDVS_WEIGHTS,
     NEIGHBOURS,
     NO_WEIGHTS,
+    PLACES,
     AnyWeights,
     Symmetric,
     Weights,
-    pairs,
 )
 from hexmj.errors import InputError
 from hexmj.files import SEARCHED, read_toml
+from hexmj.validate import choice, number
 
 OWN = Path(__file__).with_name("own.toml")
 """Our own weight sets, with the commands that found or built them."""
@@ -51,43 +51,37 @@ def network_toml(network: Cruse1998) -> str:
     Raises:
         InputError: the model variant has no name.
     """
-    rules, weights = {"order": network.order, "model_variant": variant_name(network.model_variant)}, network.weights
+    variant, weights = variant_name(network.model_variant), network.weights
+    named_variant(variant)
+    rules = {"order": network.order, "model_variant": variant}
     lines = [f'{key} = "{value}"' for key, value in rules.items() if value != "printed"]
     if isinstance(weights, Symmetric):
         lines += ["[symmetric]", *(f"{key} = {value!r}" for key, value in asdict(weights).items())]
         return "\n".join(lines) + "\n"
     for kind in NEIGHBOURS:
-        matrix = getattr(weights, kind)
+        values = {(d, e): getattr(weights, kind)[d, e].item() for of, (d, e) in PLACES if of == kind}
         lines += ["", f"[weights.{kind}]"]
-        lines += [f'"{d + 1},{e + 1}" = {matrix[d, e].item()!r}' for d, e in pairs(kind) if matrix[d, e]]
+        lines += [f'"{d + 1},{e + 1}" = {value!r}' for (d, e), value in values.items() if value]
     return "\n".join(lines).lstrip() + "\n"
 
 
 def _weights(table: dict[str, Any]) -> AnyWeights:
-    if list(table) == ["symmetric"]:
-        return Symmetric(**_numbers("symmetric", table["symmetric"], [field.name for field in fields(Symmetric)]))
-    if list(table) != ["weights"] or not isinstance(table["weights"], dict) or table["weights"].keys() - NEIGHBOURS:
-        kinds = ", ".join(NEIGHBOURS)
-        raise InputError(
-            f"tables {', '.join(table) or 'none'}; expected [symmetric], or [weights.*] with {kinds}, and before them"
-            " order and model_variant"
-        )
-    numbers = {}
-    for kind, entries in table["weights"].items():
-        keys = {f"{d + 1},{e + 1}": (d, e) for d, e in pairs(kind)}
-        given = _numbers(f"weights.{kind}", entries, list(keys))
-        numbers |= {(kind, keys[key]): value for key, value in given.items()}
-    return Weights.of(numbers)
+    match table:
+        case {"symmetric": dict() as values} if len(table) == 1:
+            return Symmetric(**_numbers(values, [field.name for field in fields(Symmetric)]))
+        case {"weights": dict() as kinds} if len(table) == 1 and all(isinstance(one, dict) for one in kinds.values()):
+            places = {f"{kind} {d + 1},{e + 1}": (kind, (d, e)) for kind, (d, e) in PLACES}
+            values = {f"{kind} {key}": value for kind, entries in kinds.items() for key, value in entries.items()}
+            return Weights.of({places[name]: value for name, value in _numbers(values, [*places]).items()})
+    raise InputError(
+        f"tables {', '.join(table) or 'none'}; expected [symmetric], or [weights.*] with {', '.join(NEIGHBOURS)}, and"
+        " before them order and model_variant"
+    )
 
 
-def _numbers(name: str, table: Any, valid: list[str]) -> dict[str, float]:
-    """Return the entries of a table if all are finite numbers with valid keys."""
-    if not isinstance(table, dict) or table.keys() - set(valid):
-        raise InputError(f"[{name}] is {table!r:.80}; valid keys: {', '.join(valid)}")
-    for key, value in table.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(f"[{name}] {key} = {value!r}; expected a finite number")
-    return {key: float(value) for key, value in table.items()}
+def _numbers(table: dict[str, Any], valid: list[str]) -> dict[str, float]:
+    """Return the entries of a table if all are numbers with valid names."""
+    return {choice("weight", name, valid): number(name, value) for name, value in table.items()}
 
 
 @cache

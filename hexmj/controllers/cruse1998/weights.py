@@ -6,9 +6,8 @@ P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 
@@ -22,19 +21,8 @@ NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p
 BINARY = ("p2", "p4")
 
 
-def pairs(kind: str) -> list[tuple[int, int]]:
-    """Return all (destination, source) pairs of one kind of weight, in the paper's order."""
-    return [(d, e) for d, sources in enumerate(NEIGHBOURS[kind]) for e in sources]
-
-
-def _in_vector(size: int) -> list[tuple[str, tuple[int, int]]]:
-    """Return kind and pair of each number in a vector of `size`; the short form leaves out P^{3,4}."""
-    return [(kind, pair) for kind in NEIGHBOURS if kind != "p34" or size == 58 for pair in pairs(kind)]
-
-
-def names_of(places: Sequence[tuple[str, tuple[int, int]]]) -> tuple[str, ...]:
-    """Return names of weights, such as ``p1 1,2`` for a kind and a pair: the paper counts legs from 1."""
-    return tuple(f"{kind} {d + 1},{e + 1}" for kind, (d, e) in places)
+PLACES = [(kind, (d, e)) for kind, table in NEIGHBOURS.items() for d, sources in enumerate(table) for e in sources]
+"""Kind, and destination and source leg, of each of the 58 general weights, in the paper's order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +54,7 @@ class Weights:
             if matrix.shape != (6, 6) or not np.isfinite(matrix).all():
                 raise InputError(f"{kind} has the shape {matrix.shape}; expected 6 x 6 finite weights")
             allowed = np.zeros((6, 6), dtype=bool)
-            allowed[tuple(np.transpose(pairs(kind)))] = True
+            allowed[tuple(np.transpose([pair for of, pair in PLACES if of == kind]))] = True
             if (stray := np.argwhere((matrix != 0) & ~allowed)).size:
                 d, e = (LEGS[leg] for leg in stray[0])
                 raise InputError(f"{kind} of leg {d} from leg {e} is not 0; expected 0, since they are no neighbours")
@@ -85,25 +73,19 @@ class Weights:
 
     @classmethod
     def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Weights":
-        """Return weights from 58 numbers (48: p34 = 0), kind by kind, each in the order of destination, then N_d.
+        """Return weights from 58 numbers in the order of `PLACES`.
 
         Raises:
             InputError: another number of them, or an invalid weight.
         """
         values = numbers("weights", vector).ravel()
-        if values.size not in (48, 58):
-            raise InputError(f"{values.size} weights; expected 58 (LDVS form) or 48 (HWS form)")
-        return cls.of(dict(zip(_in_vector(values.size), values, strict=True)))
+        if values.size != len(PLACES):
+            raise InputError(f"{values.size} weights; expected {len(PLACES)}")
+        return cls.of(dict(zip(PLACES, values, strict=True)))
 
-    def to_vector(self, size: Literal[48, 58] = 58) -> np.ndarray:
-        """Return the inverse of `from_vector`.
-
-        Raises:
-            InputError: another size, or 48 where p34 is not 0.
-        """
-        if size not in (48, 58) or (size == 48 and self.p34.any()):
-            raise InputError(f"size = {size}; expected 58, or 48 if p34 is 0")
-        return np.array([getattr(self, kind)[pair] for kind, pair in _in_vector(size)])
+    def to_vector(self) -> np.ndarray:
+        """Return the inverse of `from_vector`."""
+        return np.array([getattr(self, kind)[pair] for kind, pair in PLACES])
 
 
 @dataclass(frozen=True)
@@ -138,30 +120,6 @@ class Symmetric:
                 raise InputError(f"{key} = {value}; expected {allowed}")
             object.__setattr__(self, key, float(value))
 
-    @classmethod
-    def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Symmetric":
-        """Return weights from ten numbers in the order of the fields, or from nine without p34_i.
-
-        Raises:
-            InputError: another number of them, or an invalid weight.
-        """
-        values, names = numbers("weights", vector).ravel().tolist(), [field.name for field in fields(cls)]
-        if len(values) not in (9, 10):
-            raise InputError(f"{len(values)} weights; expected 10 (LDVS form) or 9 (HWS form)")
-        if len(values) == 9:
-            names.remove("p34_i")
-        return cls(**dict(zip(names, values, strict=True)))
-
-    def to_vector(self, size: Literal[9, 10] = 10) -> np.ndarray:
-        """Return the inverse of `from_vector`.
-
-        Raises:
-            InputError: another size, or 9 where p34_i is not 0.
-        """
-        if size not in (9, 10) or (size == 9 and self.p34_i):
-            raise InputError(f"size = {size}; expected 10, or 9 if p34_i is 0")
-        return np.array([value for key, value in asdict(self).items() if key != "p34_i" or size == 10])
-
     def expand(self) -> Weights:
         """Return the general weights of Appendix A, equal on both sides and along each side."""
         sides = {  # ipsilateral, contralateral
@@ -173,10 +131,7 @@ class Symmetric:
             "p34": (self.p34_i, 0.0),
             "p4": (self.p4_i, 0.0),
         }
-        matrices = {kind: np.zeros((6, 6)) for kind in sides}
-        for kind, (d, e) in _in_vector(58):
-            matrices[kind][d, e] = sides[kind][abs(d - e) == 3]
-        return Weights(**matrices)
+        return Weights.of({(kind, (d, e)): sides[kind][abs(d - e) == 3] for kind, (d, e) in PLACES})
 
 
 AnyWeights = Symmetric | Weights
