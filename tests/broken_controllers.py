@@ -210,7 +210,7 @@ def begun_elsewhere(plan: LiftedPlan, which: np.ndarray, tips: np.ndarray) -> No
 def with_the_first(plan: LiftedPlan, tips: np.ndarray, standing: np.ndarray) -> None:
     """All starts walk as fast as the first one after they were seen."""
     LiftedPlan.see(plan, tips, standing)
-    plan._final = np.full_like(plan._final, plan._final[0])
+    plan.velocity = np.full_like(plan.velocity, plan.velocity[0])
 
 
 def forgetful(plan: LiftedPlan, which: np.ndarray) -> None:

@@ -1,7 +1,7 @@
 """The common part of all baselines: the interface, the legs, and their names."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -60,10 +60,6 @@ def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_on
     assert np.allclose(found.duty_factor, 1 / (1 + velocity), atol=0.02)  # swings even out by a factor V a period
 
 
-class Age(NamedTuple):
-    since: np.ndarray
-
-
 @pytest.mark.parametrize(
     ("name", "make"),
     [
@@ -90,10 +86,10 @@ def test_a_rule_may_change_its_arguments() -> None:
 
     starts, walks = hexmj.draw_starts(4, 0), []
     for spoils in (False, True):
-        own = {"name": "rule", "at_start": lambda self, legs: Age(legs.x), "lifts": lifts(spoils)}
+        own = {"name": "rule", "at_start": lambda self, legs: legs.x, "lifts": lifts(spoils)}
         rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
         plan = rule.begin(starts, np.full(4, 0.5), Stride())
-        plan._state.since[:] = 1.0
+        plan._state[:] = 1.0
         assert np.array_equal(plan.starts, starts)
         walks.append(plan.advance(200))
     for name in PLANNED:

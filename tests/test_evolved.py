@@ -9,7 +9,7 @@ import pytest
 
 import hexmj
 from hexmj.cli.main import command
-from hexmj.controllers.baselines.evolved import EVOLVED, FOUND, TAU, Evolved, Potentials
+from hexmj.controllers.baselines.evolved import EVOLVED, FOUND, TAU, Evolved
 from hexmj.controllers.baselines.lifted import Legs
 from hexmj.files import read_toml
 from hexmj.gaits import gait
@@ -34,7 +34,7 @@ def test_a_neuron_by_itself_obeys_the_equation():
         lifted.append(now[0])
     time = Stride().dt * np.arange(1, 201)
     potential = drive * (1 - np.exp(-time / (TAU * 2**1.5)))
-    np.testing.assert_allclose(state.y, potential[-1], rtol=1e-12)
+    np.testing.assert_allclose(state, potential[-1], rtol=1e-12)
     assert (np.argwhere(np.all(lifted, axis=1)) == np.argmax(potential > 0.6)).all()
     assert np.sum(lifted) == 6
 
@@ -44,9 +44,7 @@ def test_a_weight_reaches_the_neighbour_that_it_names(weight: str, receiver: int
     """What L2 sends is felt by one leg alone, with the sign of the weight."""
     y = np.zeros((1, 6))
     y[0, L2] = 2.0
-    plain, joined = (
-        one.lifts(Potentials(y), legs(0.0))[0].y for one in (Evolved(), replace(Evolved(), **{weight: -1.5}))
-    )
+    plain, joined = (one.lifts(y, legs(0.0))[0] for one in (Evolved(), replace(Evolved(), **{weight: -1.5})))
     assert np.argwhere(np.abs(joined - plain) > 0.01).tolist() == [[0, receiver]]
     assert joined[0, receiver] < plain[0, receiver]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hexmj.controllers.baselines.lifted import Legs
-from hexmj.controllers.baselines.scores import Nothing, Scores
+from hexmj.controllers.baselines.scores import Scores
 from hexmj.timing import Stride
 
 RULES = Scores()
@@ -21,7 +21,7 @@ def legs(travel: dict[int, float], swings: tuple[int, ...] = ()) -> Legs:
 
 
 def lifted(state: Legs) -> list[int]:
-    return np.flatnonzero(RULES.lifts(Nothing(), state)[1][0]).tolist()
+    return np.flatnonzero(RULES.lifts((), state)[1][0]).tolist()
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ class Step:
 
 @dataclass(eq=False)
 class StepwisePlan:
-    """A `protocol.Plan` that calls a function for each step."""
+    """A `protocol.Plan` that calls a function for each step; with `sense` it is a `protocol.FeedbackPlan`."""
 
     step: Callable[[np.ndarray], Step]
     """See `stepwise`."""
@@ -45,8 +45,12 @@ class StepwisePlan:
     """Step range, lines of the tips and time step."""
     acceleration: Acceleration | None
     """Eq. 11."""
+    age: int | np.ndarray = 0
+    """Steps since the acceleration began, (start,) or one number."""
     done: int = 0
     """Steps planned so far."""
+    sense: Callable[[Sensed], None] = field(init=False, repr=False)
+    """Receives the state of the legs before the next step is planned."""
 
     def advance(self, steps: int) -> PlannedWalk:
         """Return the next `steps` steps.
@@ -54,12 +58,10 @@ class StepwisePlan:
         Raises:
             InputError: the function returns no `Step`, or values that do not broadcast to (start, leg).
         """
-        stride, shape = self.stride, self.starts.shape
-        v = commanded_velocities(self.velocity, self.done, steps, stride, self.acceleration)
-        planned = {name: np.empty((steps, *shape), dtype=bool if name == "stance" else float) for name in PLANNED}
+        stride, shape = self.stride, (steps, *self.starts.shape)
+        v = np.array(commanded_velocities(self.velocity, self.age, steps, stride, self.acceleration))
         defaults = {"y": stride.geometry.y, "aep": stride.aep0, "height": np.nan}
-        for name, value in defaults.items():
-            planned[name][:] = value
+        planned = {name: np.full(shape, defaults.get(name, 0.0)) for name in PLANNED} | {"stance": np.ones(shape, bool)}
         for n, now in enumerate(v):
             step = self.step(now.copy())
             if not isinstance(step, Step):
@@ -67,18 +69,10 @@ class StepwisePlan:
             for name, values in planned.items():
                 value = getattr(step, name)
                 if value is not None or name not in defaults:
-                    values[n] = _checked(name, value, shape)
-        self.done += steps
+                    _put(name, value, values[n])
+        self.done, self.age = self.done + steps, self.age + steps
         time = np.arange(self.done - steps + 1, self.done + 1) * stride.dt
-        return PlannedWalk(time, np.array(v), **planned, geometry=stride.geometry)
-
-
-@dataclass(eq=False)
-class StepwiseFeedbackPlan(StepwisePlan):
-    """A `protocol.FeedbackPlan` that calls a function for each step, and another for what is sensed."""
-
-    sense: Callable[[Sensed], None] = field(kw_only=True)
-    """Receives the state of the legs before the next step is planned."""
+        return PlannedWalk(time, v, **planned, geometry=stride.geometry)
 
 
 def stepwise(
@@ -103,20 +97,22 @@ def stepwise(
         InputError: a start or velocity is out of range.
     """
     x = checked_starts(starts, stride)
-    arguments = step, x, checked_velocities(velocity, len(x), acceleration), stride, acceleration
-    return StepwiseFeedbackPlan(*arguments, sense=sense) if sense else StepwisePlan(*arguments)
+    plan = StepwisePlan(step, x, checked_velocities(velocity, len(x), acceleration), stride, acceleration)
+    if sense:
+        plan.sense = sense
+    return plan
 
 
-def _checked(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return a value of one step as an array of the shape (start, leg)."""
-    values = np.asarray(leg_last(value))
-    expected = "b" if name == "stance" else "fiu"
+def _put(name: str, value: Any, into: np.ndarray) -> None:
+    """Write a value of one step into an array, (start, leg)."""
+    given = np.asarray(leg_last(value))
     try:
-        if values.dtype.kind in expected:
-            return values if values.shape == shape else np.broadcast_to(values, shape)
+        if given.dtype.kind in ("b" if name == "stance" else "fiu"):
+            into[:] = given
+            return
     except ValueError:
         pass
     raise InputError(
-        f"{name} of a step has the shape {values.shape} and the type {values.dtype}; expected"
-        f" {'booleans' if name == 'stance' else 'numbers'} that broadcast to {shape}"
+        f"{name} of a step has the shape {given.shape} and the type {given.dtype}; expected"
+        f" {'booleans' if name == 'stance' else 'numbers'} that broadcast to {into.shape}"
     )

@@ -18,11 +18,10 @@ LDVS; in kinematic walks it loses stability more often than LDVS up to V = 0.3.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers, from_neighbour
+from hexmj.controllers.baselines.lifted import Legs, Lifted, from_neighbour
 from hexmj.files import read_toml
 from hexmj.legs import MIRROR, N2, N4
 from hexmj.validate import number
@@ -38,13 +37,6 @@ TAU = 2.0
 
 LONGEST = 1000
 """Greatest log2 of the time constant, near the limit of double precision."""
-
-
-class Potentials(NamedTuple):
-    """State of the network."""
-
-    y: np.ndarray
-    """(start, leg)."""
 
 
 @dataclass(frozen=True)
@@ -70,20 +62,19 @@ class Evolved(Lifted):
     name: str = "evolved"
 
     def __post_init__(self) -> None:
-        check_numbers(self)
+        super().__post_init__()
         number("tau", self.tau, -LONGEST, LONGEST)
 
     mirrored = True
 
-    def at_start(self, legs: Legs) -> Potentials:
-        """See `LiftingRule`: all potentials are 0."""
-        return Potentials(np.zeros_like(legs.x))
+    def at_start(self, legs: Legs) -> np.ndarray:
+        """See `LiftingRule`: all potentials, (start, leg), are 0."""
+        return np.zeros_like(legs.x)
 
-    def lifts(self, state: Potentials, legs: Legs) -> tuple[Potentials, np.ndarray]:
+    def lifts(self, state: np.ndarray, legs: Legs) -> tuple[np.ndarray, np.ndarray]:
         """See `LiftingRule`: the equation, solved exactly for outputs and inputs that are constant over the step."""
-        before = state.y
         with np.errstate(over="ignore"):  # there the output is 0
-            sent = 1.0 / (1.0 + np.exp(-GAIN * (before + self.theta)))
+            sent = 1.0 / (1.0 + np.exp(-GAIN * (state + self.theta)))
         drive = (
             self.own * sent
             + self.behind * from_neighbour(N2, sent)
@@ -92,8 +83,8 @@ class Evolved(Lifted):
             + self.position * legs.travel
             + self.velocity * legs.v
         )
-        y = drive + (before - drive) * np.exp(-legs.stride.dt / (TAU * 2.0**self.tau))
-        return Potentials(y), (before <= -self.theta) & (y > -self.theta)
+        y = drive + (state - drive) * np.exp(-legs.stride.dt / (TAU * 2.0**self.tau))
+        return y, (state <= -self.theta) & (y > -self.theta)
 
 
 EVOLVED = Evolved(**read_toml(FOUND)["fields"])

@@ -5,16 +5,19 @@ so, and at PEP_min at the latest, beyond which no leg reaches. So V, V_p, AEP_0 
 1998 network, and every baseline walks from the same random starts.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from hexmj.controllers.protocol import Sensed
+from hexmj.controllers.stepwise import Step, StepwisePlan
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.timing import AT_SPEED, Acceleration, Stride, commanded_velocities
 from hexmj.validate import choice, number
-from hexmj.walks import PlannedWalk
+
+MOST = 1.7e308
+"""Greatest finite number that a field may have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,25 +51,14 @@ class Legs:
         return 1.0 / (1.0 + self.v)
 
 
-def check_numbers(rule: Any) -> None:
-    """Validate floats and `Literal`s of a frozen dataclass. Use as `__post_init__`."""
-    hints = get_type_hints(type(rule))
-    for name in (field.name for field in fields(rule)):
-        if hints[name] is float:
-            object.__setattr__(rule, name, number(name, getattr(rule, name), -MOST, MOST))
-        elif get_origin(hints[name]) is Literal:
-            choice(name, getattr(rule, name), get_args(hints[name]))
-
-
-MOST = 1.7e308
-"""Greatest finite number that a field may have."""
-
-
 class LiftingRule(Protocol):
     """A controller that only decides which legs are lifted. Both methods treat every start independently."""
 
+    reads_load: bool
+    """See `Lifted`."""
+
     def at_start(self, legs: Legs) -> Any:
-        """Return the state at time 0, when all legs stand: a named tuple of arrays whose first axis is the start."""
+        """Return the state at time 0, when all legs stand: an array whose first axis is the start, or a named tuple."""
         ...
 
     def lifts(self, state: Any, legs: Legs) -> tuple[Any, np.ndarray]:
@@ -74,8 +66,8 @@ class LiftingRule(Protocol):
         ...
 
 
-class LiftedPlan:
-    """A `protocol.SteerablePlan` whose legs a rule lifts."""
+class LiftedPlan(StepwisePlan):
+    """A `protocol.SteerablePlan` whose legs a rule lifts; a `protocol.FeedbackPlan` if the rule reads the load."""
 
     def __init__(
         self,
@@ -87,26 +79,14 @@ class LiftedPlan:
         age: int = 0,
     ) -> None:
         """Begin at time 0; an acceleration began `age` steps earlier."""
-        self.starts, self.stride, self.done = checked_starts(starts, stride), stride, 0
-        self._rule, self._acceleration = rule, acceleration
-        self._final = checked_velocities(velocity, len(self.starts), acceleration)
-        self._age = np.full(len(self.starts), age)
-        self._legs = self._at_rest(self.starts)
+        x = checked_starts(starts, stride)
+        v = checked_velocities(velocity, len(x), acceleration)
+        super().__init__(self._step, x, v, stride, acceleration, np.full(len(x), age))
+        self._rule, self._felt = rule, np.full(x.shape, np.nan)
+        self._legs = self._at_rest(x)
         self._state: Any = rule.at_start(self._legs.copied())
-
-    def advance(self, steps: int) -> PlannedWalk:
-        """Return the next `steps` steps."""
-        stride, shape = self.stride, (steps, *self.starts.shape)
-        velocity = np.array(commanded_velocities(self._final, self._age, steps, stride, self._acceleration))
-        x, stance = np.empty(shape), np.empty(shape, dtype=bool)
-        for n in range(steps):
-            self._step(velocity[n][:, None])
-            x[n], stance[n] = self._legs.x, self._legs.stands
-        self.done += steps
-        self._age = self._age + steps
-        time = np.arange(self.done - steps + 1, self.done + 1) * stride.dt
-        y, aep, height = (np.broadcast_to(value, shape) for value in (stride.geometry.y, stride.aep0, np.nan))
-        return PlannedWalk(time, velocity, x, y, stance, stride.geometry, aep=aep, height=height)
+        if rule.reads_load:
+            self.sense = self._feel
 
     @property
     def tips(self) -> np.ndarray:
@@ -126,56 +106,49 @@ class LiftedPlan:
         """See `protocol.SteerablePlan`."""
         self.slow_down(which)
         rest = self._at_rest(tips)
-        fresh = self._rule.at_start(rest.copied())
-        self._state = type(self._state)(*(_chosen(which, a, b) for a, b in zip(fresh, self._state, strict=True)))
+        self._state = _chosen(which, self._rule.at_start(rest.copied()), self._state)
         self.see(_chosen(which, tips, self.tips), _chosen(which, rest.stands, self.standing))
 
     def slow_down(self, which: np.ndarray) -> None:
         """See `protocol.SteerablePlan`."""
-        self._age = np.where(which, 0, self._age)
+        self.age = np.where(which, 0, self.age)
 
     def _at_rest(self, tips: np.ndarray) -> Legs:
         """Return legs that all stand and carry equal parts of the weight."""
-        v = commanded_velocities(self._final, self._age, 1, self.stride, self._acceleration)[0]
+        v = commanded_velocities(self.velocity, self.age, 1, self.stride, self.acceleration)[0]
         stands = np.ones(tips.shape, dtype=bool)
         return Legs(tips, stands, _equal_parts(stands), v[:, None], self.stride)
 
-    def _step(self, v: np.ndarray) -> None:
-        legs, dt = self._legs, self.stride.dt
+    def _step(self, velocity: np.ndarray) -> Step:
+        legs, dt, v = self._legs, self.stride.dt, velocity[:, None]
         x = legs.x + np.where(legs.stands, -v * dt, dt)
         stands = legs.stands | (x > self.stride.aep0 - dt / 2)
-        moved = Legs(x, stands, self._load(stands), v, self.stride)
+        load = np.where(np.isnan(self._felt), _equal_parts(stands), self._felt)
+        moved = Legs(x, stands, load, v, self.stride)
         self._state, lifted = self._rule.lifts(self._state, moved.copied())
         self._legs = replace(moved, stands=stands & ~(lifted | (x - v * dt < self.stride.pep_min)))
+        return Step(self._legs.x, self._legs.stands)
 
-    def _load(self, stands: np.ndarray) -> np.ndarray:
-        """Return the share of the weight on each foot, as planned."""
-        return _equal_parts(stands)
-
-
-class LoadedPlan(LiftedPlan):
-    """The same with the measured load as sensory feedback, a `protocol.FeedbackPlan`; nothing else is sensed."""
-
-    _felt: np.ndarray | None = None
-
-    def sense(self, sensed: Sensed) -> None:
+    def _feel(self, sensed: Sensed) -> None:
         """Receive the loads; a start whose feet are all in the air has none."""
-        if self._felt is None:
-            self._felt = np.full(self.starts.shape, np.nan)
         pressed = np.maximum(sensed.load, 0.0)  # a foot that pulls and is held by adhesion carries no weight
         total = pressed.sum(axis=1, keepdims=True)
         self._felt[sensed.ids] = np.divide(pressed, total, out=np.zeros_like(pressed), where=total > 0)
 
-    def _load(self, stands: np.ndarray) -> np.ndarray:
-        planned = _equal_parts(stands)
-        return planned if self._felt is None else np.where(np.isnan(self._felt), planned, self._felt)
-
 
 class Lifted:
-    """Base class that makes a `LiftingRule` a `protocol.SteerableController`."""
+    """Base class that makes a `LiftingRule` a `protocol.SteerableController`, and validates its fields."""
 
     reads_load = False
-    """Whether the rule uses the load."""
+    """Whether the rule uses the load; nothing else is sensed."""
+
+    def __post_init__(self) -> None:
+        """Validate floats and `Literal`s of the frozen dataclass."""
+        for name, kind in get_type_hints(type(self)).items():
+            if kind is float:
+                object.__setattr__(self, name, number(name, getattr(self, name), -MOST, MOST))
+            elif get_origin(kind) is Literal:
+                choice(name, getattr(self, name), get_args(kind))
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> LiftedPlan:
         """See `protocol.Controller.begin`."""
@@ -186,8 +159,7 @@ class Lifted:
         return self._plan(starts, velocity, stride, acceleration, AT_SPEED)
 
     def _plan(self, *arguments: Any) -> LiftedPlan:
-        kind = LoadedPlan if self.reads_load else LiftedPlan
-        return kind(self, *arguments)  # pyright: ignore[reportArgumentType]
+        return LiftedPlan(self, *arguments)  # pyright: ignore[reportArgumentType]
 
 
 def from_neighbour(table: tuple[tuple[int, ...], ...], values: np.ndarray) -> np.ndarray:
@@ -209,6 +181,8 @@ def _equal_parts(stands: np.ndarray) -> np.ndarray:
     return stands / np.maximum(stands.sum(axis=1, keepdims=True), 1)
 
 
-def _chosen(which: np.ndarray, chosen: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return `chosen` for the starts in `which`, (start,), and `other` elsewhere."""
+def _chosen(which: np.ndarray, chosen: Any, other: Any) -> Any:
+    """Return `chosen` for the starts in `which`, (start,), and `other` elsewhere, in arrays or named tuples of them."""
+    if isinstance(chosen, tuple):
+        return type(chosen)(*(_chosen(which, *pair) for pair in zip(chosen, other, strict=True)))
     return np.where(which.reshape(-1, *[1] * (chosen.ndim - 1)), chosen, other)

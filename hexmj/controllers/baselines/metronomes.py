@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers
+from hexmj.controllers.baselines.lifted import Legs, Lifted
 from hexmj.timing import Stride
 
 BEHIND = np.array([2.0, 1.0, 0.0, 2.0, 1.0, 0.0])
@@ -40,8 +40,6 @@ class Metronome(Lifted):
     wave: Literal["wilson", "graham"] = "wilson"
     """Swings run from hind to front, or in two tripods."""
     name: str = "wilson"
-
-    __post_init__ = check_numbers
 
     def at_start(self, legs: Legs) -> Clock:
         """See `LiftingRule`."""

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers, sum_of_legs
+from hexmj.controllers.baselines.lifted import Legs, Lifted, sum_of_legs
 
 NU = 12.0
 """The source's intrinsic frequency [Hz], to which w and alpha are set in proportion."""
@@ -52,8 +52,6 @@ class PhaseOscillators(Lifted):
     amplitude_at_start: float = 0.0
     """r at time 0; source."""
     name: str = "cpg-tripod"
-
-    __post_init__ = check_numbers
 
     @property
     def mirrored(self) -> bool:

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers, sum_of_legs
+from hexmj.controllers.baselines.lifted import Legs, Lifted, sum_of_legs
 from hexmj.errors import Refused
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
@@ -68,8 +68,6 @@ class Righetti(Lifted):
     loaded: float = 0.25
     """Share of the weight above which a leg does not begin a swing; ours."""
     name: str = "righetti"
-
-    __post_init__ = check_numbers
 
     reads_load = True
     mirrored = True

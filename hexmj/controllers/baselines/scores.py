@@ -15,16 +15,11 @@ PEP_min, where they swing without being selected, so that the rules no longer de
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers, from_neighbour
+from hexmj.controllers.baselines.lifted import Legs, Lifted, from_neighbour
 from hexmj.legs import MIRROR, N2, N4
-
-
-class Nothing(NamedTuple):
-    """State of the rules: none, since the legs' states suffice."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +40,11 @@ class Scores(Lifted):
     """Fraction of the highest score by which a score may be lower and still count as equal; source."""
     name: str = "flygym-rules"
 
-    __post_init__ = check_numbers
+    def at_start(self, legs: Legs) -> tuple[()]:
+        """See `LiftingRule`: no state, since the states of the legs suffice."""
+        return ()
 
-    def at_start(self, legs: Legs) -> Nothing:
-        """See `LiftingRule`."""
-        return Nothing()
-
-    def lifts(self, state: Nothing, legs: Legs) -> tuple[Nothing, np.ndarray]:
+    def lifts(self, state: tuple[()], legs: Legs) -> tuple[tuple[()], np.ndarray]:
         """See `LiftingRule`."""
         scores, waits = self.scores(legs), legs.stands & (legs.travel >= 1.0)
         highest = scores.max(axis=1, keepdims=True)  # also of legs that do not wait, as in the source

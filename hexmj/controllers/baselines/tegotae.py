@@ -18,19 +18,11 @@ Sensed: the load on each foot.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from hexmj.controllers.baselines.lifted import Legs, Lifted, check_numbers, from_neighbour
+from hexmj.controllers.baselines.lifted import Legs, Lifted, from_neighbour
 from hexmj.legs import MIRROR, N2, N4
-
-
-class Phases(NamedTuple):
-    """State of the oscillators."""
-
-    phase: np.ndarray
-    """(start, leg) phi / 2 pi [periods]; a swing begins at each whole number."""
 
 
 @dataclass(frozen=True)
@@ -43,24 +35,21 @@ class Tegotae(Lifted):
     """sigma_2 W / (6 omega), the same of its neighbours; ours."""
     name: str = "tegotae"
 
-    __post_init__ = check_numbers
-
     reads_load = True
     mirrored = True
 
-    def at_start(self, legs: Legs) -> Phases:
-        """See `LiftingRule`."""
-        return Phases(0.5 + 0.5 * np.clip(legs.travel, 0.0, 1.0))
+    def at_start(self, legs: Legs) -> np.ndarray:
+        """See `LiftingRule`: phi / 2 pi, (start, leg) [periods]; a swing begins at each whole number."""
+        return 0.5 + 0.5 * np.clip(legs.travel, 0.0, 1.0)
 
-    def lifts(self, state: Phases, legs: Legs) -> tuple[Phases, np.ndarray]:
+    def lifts(self, state: np.ndarray, legs: Legs) -> tuple[np.ndarray, np.ndarray]:
         """See `LiftingRule`."""
-        phase = state.phase
         span = legs.stride.aep0 - legs.stride.pep0
         omega = 0.5 * legs.stride.dt / span * np.where(legs.stands, legs.v, 1.0)  # omega dt [periods]
         load = 6.0 * legs.load
         feedback = self.neighbours * _mean_of_neighbours(load) - self.own * load
-        after = phase + omega * np.maximum(1.0 + feedback * np.cos(2.0 * np.pi * phase), 0.0)  # Eq. 1
-        return Phases(after), np.ceil(after) > np.ceil(phase)
+        after = state + omega * np.maximum(1.0 + feedback * np.cos(2.0 * np.pi * state), 0.0)  # Eq. 1
+        return after, np.ceil(after) > np.ceil(state)
 
 
 def _mean_of_neighbours(load: np.ndarray) -> np.ndarray:

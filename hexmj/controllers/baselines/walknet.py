@@ -19,7 +19,6 @@ Chosen by us, since the sources do not say: the `swing_speed` of `CURVE`, and ho
 """
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -176,13 +175,6 @@ def sent_load(load: np.ndarray) -> np.ndarray:
     return np.maximum(np.minimum(3.0 * load, 1.0) - 20.0 / 50.0, 0.0)
 
 
-class Stances(NamedTuple):
-    """State of Walknet."""
-
-    age: np.ndarray
-    """(start, leg) time since touchdown [time units]; infinite where there was none."""
-
-
 @dataclass(frozen=True)
 class Walknet(Lifted):
     """Legs that shift each other's PEP."""
@@ -215,20 +207,20 @@ class Walknet(Lifted):
             raise InputError(f"{self.name} without rule {rule}; expected one of {', '.join(map(str, self.rules))}")
         return replace(self, name=f"{self.name}-without-{rule}", rules=tuple(r for r in self.rules if r != rule))
 
-    def at_start(self, legs: Legs) -> Stances:
-        """See `LiftingRule`."""
-        return Stances(np.full(legs.x.shape, np.inf))
+    def at_start(self, legs: Legs) -> np.ndarray:
+        """See `LiftingRule`: times since touchdown, (start, leg) [time units]; infinite where there was none."""
+        return np.full(legs.x.shape, np.inf)
 
-    def lifts(self, state: Stances, legs: Legs) -> tuple[Stances, np.ndarray]:
+    def lifts(self, state: np.ndarray, legs: Legs) -> tuple[np.ndarray, np.ndarray]:
         """See `LiftingRule`."""
         dt, span = legs.stride.dt, legs.stride.aep0 - legs.stride.pep0
-        age = np.where(legs.stands, state.age + dt, -dt)  # 0 at the step of touchdown
+        age = np.where(legs.stands, state + dt, -dt)  # 0 at the step of touchdown
         shift = sum((self.shift(rule, legs, age) for rule in self.rules), np.zeros(legs.x.shape))
         pep = np.minimum(legs.stride.pep0 + span * shift, legs.stride.aep0 - span * self.constants.least_step)
         lifted = legs.stands & (legs.x < pep)
         if self.veto:
             lifted &= (~legs.stands).sum(axis=1, keepdims=True) < 3
-        return Stances(age), lifted
+        return age, lifted
 
     def shift(self, rule: int, legs: Legs, age: np.ndarray) -> np.ndarray:
         """Return the shift of each leg's PEP by a rule, (start, leg) [step lengths]; `age` is that of the stances."""
