@@ -71,12 +71,12 @@ def findings(
         raise InputError(f"velocities = {v.tolist()}; expected 2 to {N_STARTS}, so that walks accelerate between them")
     check_reached(v, stride, ACCELERATION)
     trials = [*_trials(controller, v, stride)]
-    for name, (law, checked) in LAWS.items():
+    for name, law in LAWS.items():
         wrong = next(filter(None, (_failure(law, trial) for trial in trials)), None)
         if wrong and name in FIRST:
             yield Finding(name, False, f"{wrong}; the later checks were left out")
             return
-        yield Finding(name, wrong is None, wrong or checked)
+        yield Finding(name, wrong is None, wrong or law.__doc__ or "")
     yield Finding("sliding", True, _sliding(trials), note=True)
 
 
@@ -107,15 +107,16 @@ def _failure(law: Callable[[Trial], None], trial: Trial) -> str | None:
 
 def _sliding(trials: list[Trial]) -> str:
     """Describe how far standing tips are from receding at V_r, as the tips of feet that stay in place on the ground."""
-    found, worst = "feet that stand stay where they are on the ground: their tips recede at V_r", 1e-6
-    for trial in trials:
-        walk, dt = trial.walk, trial.stride.dt
+    slides = []
+    for walk, dt in ((trial.walk, trial.stride.dt) for trial in trials):
         ahead, aside = np.diff(walk.x, axis=0) / dt + walk.velocity[1:, :, None], np.diff(walk.y, axis=0) / dt
-        slides = np.hypot(ahead, aside) * (walk.stance[1:] & walk.stance[:-1])
-        if slides.max() > worst:
-            worst, (step, start, leg) = slides.max(), np.argwhere(slides == slides.max())[0]
-            found = (
-                "feet that stand would slide: the tip of a foot that stays in place recedes at V_r, but one differs by"
-                f" {worst:.2g} V_p, in {place(walk, (step + 1, start, leg))}; in physical walks such feet scrape"
-            )
-    return found
+        speed = np.hypot(ahead, aside) * (walk.stance[1:] & walk.stance[:-1])
+        step, *others = np.argwhere(speed == speed.max())[0]
+        slides.append((speed.max(), place(walk, (step + 1, *others))))
+    most, where = max(slides)
+    if most <= 1e-6:
+        return "feet that stand stay where they are on the ground: their tips recede at V_r"
+    return (
+        "feet that stand would slide: the tip of a foot that stays in place recedes at V_r, but one differs by"
+        f" {most:.2g} V_p, in {where}; in physical walks such feet scrape"
+    )

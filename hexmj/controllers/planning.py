@@ -1,6 +1,7 @@
 """Plans for everyone who walks: begun with valid arguments, advanced, checked once, and searched for first losses."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,19 +64,14 @@ def begin(
 
 
 def begin_at_speed(
-    controller: SteerableController,
-    starts: np.ndarray,
-    velocity: np.ndarray,
-    stride: Stride,
-    acceleration: Acceleration | None = None,
-    threads: int | None = None,
+    controller: SteerableController, starts: np.ndarray, velocity: np.ndarray, stride: Stride, *others: Any
 ) -> SteerablePlan:
-    """Return a plan that walks at its final velocity from time 0.
+    """Return a plan that walks at its final velocity from time 0; `others` are acceleration and threads.
 
     Raises:
         InputError: the plan cannot be steered, or does not fit its arguments.
     """
-    plan = controller.begin_at_speed(starts.copy(), velocity.copy(), stride, acceleration, threads)
+    plan = controller.begin_at_speed(starts.copy(), velocity.copy(), stride, *others)
     if not isinstance(plan, SteerablePlan):
         raise InputError(f"begin_at_speed of {controller.name} returned {short(plan)}; expected a steerable plan")
     check_plan(plan, starts, stride)
@@ -147,23 +143,17 @@ def check_repeats(
     """
     plans = [begin(controller, starts, velocity, stride, acceleration, threads=1) for _ in range(2)]
     first, second = (advanced(plan, min(steps, REPEATED)) for plan in plans)
-    check_same(first, second, controller.name)
+    check_same(first, second, f"two plans of {controller.name}")
 
 
-def check_same(first: PlannedWalk, second: PlannedWalk, name: str, before: int = 0) -> None:
-    """Raise InputError if two plans of the controller `name` differ in steps that follow the first `before` ones."""
-    if differs := difference(first, second, before):
-        raise InputError(f"{name} plans another walk when it begins again: {differs}; expected the same numbers")
-
-
-def difference(first: PlannedWalk, second: PlannedWalk, before: int = 0) -> str:
-    """Describe the first number that differs between two walks of the same starts; empty if there is none."""
+def check_same(first: PlannedWalk, second: PlannedWalk, what: str, before: int = 0) -> None:
+    """Raise InputError if two walks of the same starts, described by `what`, differ; `before` steps precede both."""
     for name in (*PLANNED, "velocity"):
         a, b = getattr(first, name), getattr(second, name)
         if (bad := np.argwhere((a != b) & ~((a != a) & (b != b)))).size:
             at = tuple(bad[0])
-            return f"{name} is {a[at]!s} and {b[at]!s} in {place(first, at, before)}"
-    return ""
+            found = f"{name} is {a[at]!s} and {b[at]!s} in {place(first, at, before)}"
+            raise InputError(f"{what} differ: {found}; expected the same bits")
 
 
 def place(walk: PlannedWalk, at: Sequence[int], before: int = 0) -> str:

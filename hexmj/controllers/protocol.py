@@ -6,7 +6,7 @@ legs before each step.
 """
 
 from dataclasses import dataclass, is_dataclass
-from typing import Any, Protocol, TypeGuard, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -159,29 +159,17 @@ class Controller(Protocol):
 class SteerableController(Controller, Protocol):
     """A controller whose plans are `SteerablePlan`s, as sensory feedback and disturbances need."""
 
-    def begin_at_speed(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> SteerablePlan:
-        """Return a plan that walks at its final velocity from time 0.
+    def begin_at_speed(self, starts, velocity, stride, acceleration=None, threads=None) -> SteerablePlan:
+        """Return a plan that walks at its final velocity from time 0; its arguments are those of `begin`.
 
         The acceleration begins only with `slow_down` or `restart`.
         """
         ...
 
 
-def is_steerable(controller: object) -> TypeGuard[SteerableController]:
-    """Whether a controller has `begin_at_speed`."""
-    return isinstance(controller, SteerableController)
-
-
 def check_steerable(controller: Controller) -> None:
     """Raise InputError unless a controller is a `SteerableController`."""
-    if not is_steerable(controller):
+    if not isinstance(controller, SteerableController):
         raise InputError(
             f"{controller.name} cannot be disturbed: it has no begin_at_speed; expected a steerable controller such as"
             " the 1998 network"

@@ -9,7 +9,7 @@ import numpy as np
 from hexmj.controllers.planning import check_velocities
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, check_controller_type
 from hexmj.errors import InputError
-from hexmj.timing import Acceleration, Stride
+from hexmj.timing import Stride
 from hexmj.validate import number, whole
 from hexmj.walks import PlannedWalk
 
@@ -31,14 +31,7 @@ class Wrapper:
         """As the controller within, see `protocol.Controller`."""
         check_velocities(self.controller, [velocity], stride)
 
-    def begin(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> Plan:
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> Plan:
         """See `protocol.Controller.begin`.
 
         Raises:
@@ -90,16 +83,18 @@ class LegLost(Wrapper):
 
     def wrap(self, plan: Any) -> "LamePlan":
         """See `Wrapper`."""
-        return (LameFeedbackPlan if isinstance(plan, FeedbackPlan) else LamePlan)(plan, self.leg, self.held)
+        return LamePlan(plan, self.leg, self.held)
 
 
 class LamePlan(WrappedPlan):
-    """A plan of which one leg is held up."""
+    """A plan of which one leg is held up; it senses what the plan within does, the lost leg included."""
 
     def __init__(self, plan: Any, leg: int, held: float) -> None:
         """Wrap a plan at time 0; `held` is the leg's height [mm]."""
         super().__init__(plan)
         self._leg, self._held = leg, held
+        if isinstance(plan, FeedbackPlan):
+            self.sense = plan.sense
 
     def advance(self, steps: int) -> PlannedWalk:
         """Return the next steps; the lost leg moves to and fro in the air."""
@@ -108,14 +103,6 @@ class LamePlan(WrappedPlan):
         stance[..., self._leg] = False
         height[..., self._leg] = self._held * np.minimum(walk.time / (self._held / RISE), 1.0)[:, None]
         return replace(walk, stance=stance, height=height)
-
-
-class LameFeedbackPlan(LamePlan):
-    """The same of a `protocol.FeedbackPlan`."""
-
-    def sense(self, sensed: Sensed) -> None:
-        """Pass on the state of all legs, the lost one included."""
-        self._plan.sense(sensed)
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ def physical_walk_of_plan(
         else:
             first = chunk.first // settled.substeps
             same = part_of(planned, slice(first, first + len(chunk.plan.time)))
-            check_same(same, chunk.plan, "the controller", first)
+            check_same(same, chunk.plan, "two plans of the controller", first)
     outcomes = so_far.outcomes()
     return PhysicalWalk(
         planned=planned,

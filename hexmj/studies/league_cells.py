@@ -12,7 +12,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.planning import begin, check_repeats
-from hexmj.controllers.protocol import Controller, FeedbackPlan, is_steerable
+from hexmj.controllers.protocol import Controller, FeedbackPlan, SteerableController
 from hexmj.controllers.registry import VARIED, known_names, load_controller
 from hexmj.controllers.wrappers import LegLost
 from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
@@ -73,7 +73,7 @@ class Entrant:
     @property
     def steerable(self) -> bool:
         """Whether the controller can be halted, and a leg of it stopped."""
-        return is_steerable(self.controller)
+        return isinstance(self.controller, SteerableController)
 
 
 def entrants(names: Sequence[str], load: Callable[[str], Controller] = load_controller) -> Mapping[str, Entrant]:

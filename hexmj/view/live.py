@@ -8,7 +8,7 @@ import numpy as np
 from hexmj.body import ROOT_QPOS
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import begin, begin_at_speed
-from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, SteerablePlan, is_steerable
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, SteerableController, SteerablePlan
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import Orders, OrdersFromPlan, steps_in_chunk
 from hexmj.physics.outcomes import measured_walk
@@ -92,7 +92,7 @@ class SteeredPlan:
         Returns:
             Whether both the last plan and the controller can be steered; otherwise nothing has changed.
         """
-        if not (is_steerable(controller) and isinstance(self._plan, SteerablePlan)):
+        if not (isinstance(controller, SteerableController) and isinstance(self._plan, SteerablePlan)):
             return False
         plan = begin_at_speed(controller, self.starts, np.array([velocity]), self.stride)
         plan.see(self._plan.tips.copy(), self._plan.standing.copy())
