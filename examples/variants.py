@@ -21,7 +21,7 @@ from hexmj.controllers.cruse1998 import Cruse1998
 from hexmj.errors import InputError
 from hexmj.sweep import Cell, over_axes, run_study
 from hexmj.timing import observation_duration
-from hexmj.variants import instead, variants, varied
+from hexmj.variants import VARIANTS, variants, varied
 
 
 @dataclass(frozen=True)
@@ -79,13 +79,12 @@ class Variants:
         """Return `flss` over (controller, variant, velocity), and where a set had a variant anyway, `had`."""
         axes = {"controller": list(self.controllers), "variant": self.names, "velocity": list(self.velocities)}
         table = over_axes({name: len(values) for name, values in axes.items()}, data).assign_coords(axes)
-        had = [
-            [
-                [bool(instead(hexmj.Stride(), one) | instead(self.network(name, v), one)) for v in self.velocities]
-                for one in self.names
-            ]
-            for name in self.controllers
-        ]
+
+        def has(name: str, variant: str, velocity: float) -> bool:
+            network, changed = self.network(name, velocity), VARIANTS[variant]
+            return bool(changed) and changed.items() <= (vars(network) | vars(network.model_variant)).items()
+
+        had = [[[has(name, one, v) for v in self.velocities] for one in self.names] for name in self.controllers]
         return xr.Dataset({"flss": table.lost.mean("start"), "had": (list(axes), had)})
 
 

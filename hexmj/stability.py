@@ -23,8 +23,6 @@ within it a foot counts as lying on the line."""
 BLOCK = 4096
 """Postures that one thread computes at a time."""
 
-NOWHERE = "feet: a standing foot is at NaN or infinity"
-
 
 def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = None) -> np.ndarray:
     """Signed distance from the centre of mass to the nearest edge of the support polygon.
@@ -41,33 +39,32 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
     Raises:
         InputError: shapes that do not fit, or a standing foot at NaN.
     """
-    tips, stands = numbers("feet", feet), states("stance", stance)
-    if tips.shape[-2:] != (6, 2) or stands.shape != tips.shape[:-1]:
-        raise InputError(f"feet {tips.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg), 6 legs")
-    return _margins_of(tips, stands, threads)
-
-
-def _margins_of(tips: np.ndarray, stands: np.ndarray, threads: int | None) -> np.ndarray:
-    points = np.ascontiguousarray(tips)
-    if not np.isfinite(points[stands]).all():
-        raise InputError(NOWHERE)
-    shape = stands.shape[:-1]
-    points, stands = points.reshape(-1, *points.shape[-2:]), stands.reshape(-1, stands.shape[-1])
+    tips, stands = _checked(feet, stance)
+    if stands.shape[-1:] != (6,):
+        raise InputError(f"stance has the shape {stands.shape}; expected (..., leg) with 6 legs")
+    points, standing = np.ascontiguousarray(tips).reshape(-1, 6, 2), stands.reshape(-1, 6)
     margin = np.empty(len(points))
 
     def work(begin: int, end: int) -> None:
-        margins(points[begin:end], stands[begin:end], margin[begin:end])
+        margins(points[begin:end], standing[begin:end], margin[begin:end])
 
-    if len(points) <= BLOCK:
-        margins(points, stands, margin)
-    else:
-        run_blocks(work, len(points), BLOCK, threads)
-    return margin.reshape(shape)
+    run_blocks(work, len(points), BLOCK, threads)
+    return margin.reshape(stands.shape[:-1])
+
+
+def _checked(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Return feet, (..., leg, 2), and stance, (..., leg), if their shapes fit and all standing feet are known."""
+    tips, stands = numbers("feet", feet), states("stance", stance)
+    if tips.shape != (*stands.shape, 2):
+        raise InputError(f"feet {tips.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg)")
+    if not np.isfinite(tips[stands]).all():
+        raise InputError("feet: a standing foot is at NaN or infinity")
+    return tips, stands
 
 
 def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
     """The stability margin after each step, (step, start) [mm]; NaN where no tip is known (after a fall)."""
-    margin = _margins_of(walk.feet, walk.stance, threads)
+    margin = stability_margin(walk.feet, walk.stance, threads)
     return np.where(np.isnan(walk.x + walk.y).all(axis=-1), np.nan, margin)
 
 
@@ -93,12 +90,10 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
     Raises:
         InputError: shapes that do not fit, or a standing foot at NaN.
     """
-    tips, stands = numbers("feet", feet), states("stance", stance)
-    if tips.ndim != 2 or tips.shape[1] != 2 or stands.shape != tips.shape[:1]:
-        raise InputError(f"feet of the shape {tips.shape}, stance of {stands.shape}; expected (leg, 2) and (leg,)")
+    tips, stands = _checked(feet, stance)
+    if stands.ndim != 1:
+        raise InputError(f"stance has the shape {stands.shape}; expected (leg,)")
     points = tips[stands]
-    if not np.isfinite(points).all():
-        raise InputError(NOWHERE)
     if len(points) < 3 or np.linalg.matrix_rank(spread := points - points[0]) < 2:
         return points
     from scipy.spatial import ConvexHull, QhullError

@@ -32,9 +32,6 @@ VARIANTS: dict[str, dict[str, Any]] = {
 UNREACHED = {"AEP0 11"}
 """Variants that are out of reach of the stick insect's legs, left out of all physical walks."""
 
-INNER = ("controller", "model_variant")
-"""Fields that are varied themselves: a controller with feedback, and a model variant."""
-
 Part = TypeVar("Part")
 
 
@@ -46,38 +43,22 @@ def variants(physical: bool = False) -> list[str]:
 def varied(part: Part, variant: str) -> Part:
     """Return a stride, a network or a form of its weights under one of `VARIANTS`.
 
-    Fields that the part does not have are left out. A part that has the changed value already gets the default instead,
-    see `instead`.
+    Fields that the part does not have are left out; parts of it are varied within. A field that has the changed value
+    already gets its default instead.
 
     Raises:
         InputError: there is no such variant, or its value does not fit the part's others.
     """
     own: Any = part
-    wanted = VARIANTS[choice("variant", variant, VARIANTS)]
-    changes = {}
+    wanted, changes = VARIANTS[choice("variant", variant, VARIANTS)], {}
     for field in fields(own):
-        value = getattr(own, field.name)
-        if field.name in wanted:
-            changes[field.name] = wanted[field.name] if value != wanted[field.name] else _default(field)
-        elif field.name in INNER and is_dataclass(value):
-            changes[field.name] = varied(value, variant)
+        name, value = field.name, getattr(own, field.name)
+        if name in wanted:
+            usual = field.default if field.default_factory is MISSING else field.default_factory()
+            changes[name] = wanted[name] if value != wanted[name] else usual
+        elif is_dataclass(value) and (inner := varied(value, variant)) is not value:
+            changes[name] = inner
     try:
-        return replace(own, **changes) if wanted else part
+        return replace(own, **changes) if changes else part
     except InputError as error:
         raise InputError(f"variant {variant}: {error}") from None
-
-
-def instead(part: Any, variant: str) -> dict[str, Any]:
-    """Return the defaults that `varied` gives to fields that have the value of a variant already."""
-    found: dict[str, Any] = {}
-    for field in fields(part):
-        value = getattr(part, field.name)
-        if field.name in INNER and is_dataclass(value):
-            found |= instead(value, variant)
-        elif value == VARIANTS[variant].get(field.name, MISSING):
-            found[field.name] = _default(field)
-    return found
-
-
-def _default(field: Any) -> Any:
-    return field.default if field.default_factory is MISSING else field.default_factory()
