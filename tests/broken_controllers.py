@@ -278,7 +278,7 @@ BROKEN: list[tuple[str, Any]] = [
     ("reach", steps_changed(height=lambda walk: 30.0)),
     ("begun again", steps_changed(x=lambda walk: walk.x[0] + 1e-9 * next(COUNT))),
     ("begun again", spoilt(one_step_on_with_two_threads)),
-    ("divided", OfOneMind()),
+    ("side by side", OfOneMind()),
     ("batch", steps_changed(x=lambda walk: walk.x[0] + 1e-6 * walk.x[0].mean())),
     ("divided", walks_changed(lambda walk: {"x": walk.x + 1e-9 * len(walk.x)})),
     ("first losses", spoilt(losses_of_its_own)),

@@ -145,13 +145,20 @@ def _begun_again(trial: Trial) -> None:
 
 
 def _divided(trial: Trial) -> None:
-    """The walk depends neither on how steps are divided into calls, nor on another plan that advances in turn."""
+    """The walk does not depend on how steps are divided into calls."""
+    plan = trial.begin()
+    walk = joined([advanced(plan, steps) for steps in DIVIDED])
+    _check_equal("time (step) in parts", walk.time, trial.walk.time)
+    check_same(trial.walk, walk, f"{STEPS} steps at once and in parts of {DIVIDED}")
+
+
+def _side_by_side(trial: Trial) -> None:
+    """Two plans that advance in turn are independent."""
     other = replace(trial, starts=trial.starts[::-1], velocity=trial.velocity[::-1])
     plans = trial.begin(), other.begin()
     parts = zip(*([advanced(plan, steps) for plan in plans] for steps in DIVIDED), strict=True)
-    for whole, walk in zip((trial.walk, other.walk), map(joined, parts), strict=True):
-        _check_equal("time (step) in parts", walk.time, whole.time)
-        check_same(whole, walk, f"{STEPS} steps of a plan alone, and in parts of {DIVIDED} beside another plan")
+    for alone, walk in zip((trial.walk, other.walk), map(joined, parts), strict=True):
+        check_same(alone, walk, "a plan alone and beside another plan of the controller")
 
 
 def _batch(trial: Trial) -> None:
@@ -304,8 +311,8 @@ def _legs_as_planned(walk: PlannedWalk, ids: np.ndarray, stride: Stride, numbers
 LAWS: dict[str, Callable[[Trial], None]] = {
     law.__name__.strip("_").replace("_", " "): law
     for law in (
-        *(_settings, _begin, _steps, _times, _reach, _begun_again, _divided, _batch, _first_losses, _at_speed),
-        *(_see, _restart, _slow_down, _mirrored, _sense),
+        *(_settings, _begin, _steps, _times, _reach, _begun_again, _divided, _side_by_side, _batch, _first_losses),
+        *(_at_speed, _see, _restart, _slow_down, _mirrored, _sense),
     )
 }
 """Every interface check by its name; its docstring says what holds if it passes."""
