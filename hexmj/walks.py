@@ -151,11 +151,8 @@ def footfall_html(line: str, time: np.ndarray, swings: np.ndarray, note: str) ->
     ]
     names = [f'<text x="0" y="{row * (leg + 1) - 3}">{name}</text>' for leg, name in enumerate(LEGS)]
     low = row * (len(LEGS) + 1)
-    axis = [
-        f'<text x="{left}" y="{low}">{begin:.4g}</text>',
-        f'<text x="{left + width / 2}" y="{low}" text-anchor="middle">bars: foot off the ground; {escape(note)}</text>',
-        f'<text x="{left + width}" y="{low}" text-anchor="end">{time[-1]:.4g} time units</text>',
-    ]
+    caption = f"{begin:.4g} to {time[-1]:.4g} time units; bars: foot off the ground; {escape(note)}"
+    names.append(f'<text x="{left}" y="{low}">{caption}</text>')
     style = 'style="max-width: 100%" fill="currentColor" font-family="sans-serif" font-size="11"'
     box = f'viewBox="0 0 {left + width} {low + 4}" width="{left + width}"'
-    return f"<p>{escape(line)}</p><svg {box} {style}>{''.join(bars + names + axis)}</svg>"
+    return f"<p>{escape(line)}</p><svg {box} {style}>{''.join(bars + names)}</svg>"

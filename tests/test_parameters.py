@@ -21,7 +21,7 @@ from hexmj.controllers.cruse1998 import (
     network_toml,
 )
 from hexmj.controllers.cruse1998.presets import OWN
-from hexmj.controllers.cruse1998.weights import LDVS_WEIGHTS, NEIGHBOURS, general
+from hexmj.controllers.cruse1998.weights import NEIGHBOURS, general
 from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError
 from hexmj.legs import N1, N2, N3, N4, Geometry
@@ -61,12 +61,12 @@ def test_vectors_go_back_and_forth(controller):
 
 
 def test_appendix_a():
-    p = general(LDVS.weights)
-    assert p.p1[0, 1] == p.p1[4, 5] == LDVS_WEIGHTS.p1_i
-    assert p.p1[0, 3] == p.p1[5, 2] == LDVS_WEIGHTS.p1_c
-    assert p.p31[1, 0] == p.p31[5, 4] == LDVS_WEIGHTS.p31_i
-    assert p.p32[3, 0] == p.p33[3, 0] == LDVS_WEIGHTS.p32_c
-    assert p.p34[2, 1] == LDVS_WEIGHTS.p34_i
+    weights, p = cast(Symmetric, LDVS.weights), general(LDVS.weights)
+    assert p.p1[0, 1] == p.p1[4, 5] == weights.p1_i
+    assert p.p1[0, 3] == p.p1[5, 2] == weights.p1_c
+    assert p.p31[1, 0] == p.p31[5, 4] == weights.p31_i
+    assert p.p32[3, 0] == p.p33[3, 0] == weights.p32_c
+    assert p.p34[2, 1] == weights.p34_i
     assert p.p34[2, 5] == 0.0
     assert p.p4[1, 0] == 1.0
 

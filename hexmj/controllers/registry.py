@@ -15,7 +15,7 @@ import numpy as np
 
 from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.baselines.evolved import EVOLVED, FOUND
-from hexmj.controllers.cruse1998 import PRESETS, Cruse1998, own_tables, read_network
+from hexmj.controllers.cruse1998 import OWN_TABLES, PRESETS, Cruse1998, read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.files import SEARCHED, read_toml
@@ -59,7 +59,7 @@ def load_controller(name: str) -> Controller:
             controller = change(int(which))
         return controller
     if file := parameter_file(name):
-        table = {key: value for key, value in read_toml(file).items() if key != SEARCHED}
+        table = read_toml(file)
         return _from_table(file, table) if "controller" in table else read_network(table, name, file.stem)
     raise InputError(
         f"controller {name!r} is neither a file nor one of {', '.join(known_names())}; expected such a name,"
@@ -91,9 +91,7 @@ def searched_on(name: str, controller: Controller) -> dict[str, list[int]]:
     varied = VARIED.fullmatch(name)
     base = varied["name"] if varied else name
     weights = plain(controller.weights) if isinstance(controller, Cruse1998) else None
-    tables = {
-        own: table for own, table in own_tables().items() if base == own or weights == plain(PRESETS[own].weights)
-    }
+    tables = {own: table for own, table in OWN_TABLES.items() if base == own or weights == plain(PRESETS[own].weights)}
     if base == EVOLVED.name or controller == EVOLVED:
         tables[EVOLVED.name] = read_toml(FOUND)
     if file := parameter_file(base):
@@ -135,7 +133,7 @@ def _module(where: str) -> ModuleType:
 
 def _from_table(path: Path, table: dict[str, Any]) -> Controller:
     """Return the controller that a file names with the fields that it gives, named like the file by default."""
-    if unknown := table.keys() - {"controller", "fields"}:
+    if unknown := table.keys() - {"controller", "fields", SEARCHED}:
         raise InputError(f"{path} holds {', '.join(unknown)}; expected controller and a table [fields]")
     usual: Any = load_controller(table["controller"])
     values = table.get("fields", {})

@@ -23,14 +23,14 @@ FormName = Literal["hws", "ldvs", "mirrored", "general"]
 
 _SYMMETRIC = tuple(one.name for one in fields(Symmetric))
 
-PLACES = {"mirrored": [(kind, (d, e)) for kind, (d, e) in ALL if d < 3], "general": ALL}
-"""Forms of general weights -> kind, destination and source leg of each parameter."""
+PLACES = {"mirrored": {name: (kind, pair) for name, (kind, pair) in ALL.items() if pair[0] < 3}, "general": ALL}
+"""Forms of general weights -> names of their parameters -> kind, destination and source leg."""
 
 FORMS: dict[FormName, tuple[str, ...]] = {
     "hws": tuple(name for name in _SYMMETRIC if name != "p34_i"),
     "ldvs": _SYMMETRIC,
-    "mirrored": tuple(f"{kind} {d + 1},{e + 1}" for kind, (d, e) in PLACES["mirrored"]),
-    "general": tuple(f"{kind} {d + 1},{e + 1}" for kind, (d, e) in ALL),
+    "mirrored": tuple(PLACES["mirrored"]),
+    "general": tuple(ALL),
 }
 """Forms of the 1998 network -> names of their parameters, in the order of the vector."""
 
@@ -159,14 +159,14 @@ class NetworkForm:
     def parameters(self, weights: AnyWeights) -> np.ndarray:
         """Return the numbers in any weights that this form names, (parameter,); NaN if these have no such number."""
         if self.name in PLACES:
-            return np.array([getattr(general(weights), kind)[pair] for kind, pair in PLACES[self.name]])
+            return np.array([getattr(general(weights), kind)[pair] for kind, pair in PLACES[self.name].values()])
         known = isinstance(weights, Symmetric)
         return np.array([getattr(weights, name) if known else np.nan for name in self.names])
 
     def _weights(self, vector: np.ndarray) -> AnyWeights:
         if self.name not in PLACES:
             return Symmetric(**dict(zip(self.names, vector.tolist(), strict=True)))
-        numbers = dict(zip(PLACES[self.name], vector, strict=True))
+        numbers = dict(zip(PLACES[self.name].values(), vector, strict=True))
         if self.name == "mirrored":
             numbers |= {(kind, (MIRROR[d], MIRROR[e])): value for (kind, (d, e)), value in numbers.items()}
         return Weights.of(numbers)

@@ -130,8 +130,8 @@ class Cruse1998:
         if isinstance(old, Symmetric):
             changed = replace(old, **{key: value for key in asdict(old) if key.partition("_")[0] in kinds})
         else:
-            weights = {(kind, pair): getattr(old, kind)[pair] for kind, pair in PLACES}
-            changed = Weights.of({place: value if place[0] in kinds else weights[place] for place in PLACES})
+            weights = {(kind, pair): getattr(old, kind)[pair] for kind, pair in PLACES.values()}
+            changed = Weights.of({place: value if place[0] in kinds else weight for place, weight in weights.items()})
         if np.array_equal(general(changed).to_vector(), general(old).to_vector()):
             raise InputError(f"{name} equals {self.name}; expected a mechanism that changes the weights")
         return replace(self, weights=changed, name=name)

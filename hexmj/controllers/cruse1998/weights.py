@@ -21,8 +21,13 @@ NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p
 BINARY = ("p2", "p4")
 
 
-PLACES = [(kind, (d, e)) for kind, table in NEIGHBOURS.items() for d, sources in enumerate(table) for e in sources]
-"""Kind, and destination and source leg, of each of the 58 general weights, in the paper's order."""
+PLACES = {
+    f"{kind} {d + 1},{e + 1}": (kind, (d, e))
+    for kind, table in NEIGHBOURS.items()
+    for d, sources in enumerate(table)
+    for e in sources
+}
+"""Name of each of the 58 general weights, such as ``p1 1,2`` -> kind, destination and source leg."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +59,7 @@ class Weights:
             if matrix.shape != (6, 6) or not np.isfinite(matrix).all():
                 raise InputError(f"{kind} has the shape {matrix.shape}; expected 6 x 6 finite weights")
             allowed = np.zeros((6, 6), dtype=bool)
-            allowed[tuple(np.transpose([pair for of, pair in PLACES if of == kind]))] = True
+            allowed[tuple(np.transpose([pair for of, pair in PLACES.values() if of == kind]))] = True
             if (stray := np.argwhere((matrix != 0) & ~allowed)).size:
                 d, e = (LEGS[leg] for leg in stray[0])
                 raise InputError(f"{kind} of leg {d} from leg {e} is not 0; expected 0, since they are no neighbours")
@@ -81,11 +86,11 @@ class Weights:
         values = numbers("weights", vector).ravel()
         if values.size != len(PLACES):
             raise InputError(f"{values.size} weights; expected {len(PLACES)}")
-        return cls.of(dict(zip(PLACES, values, strict=True)))
+        return cls.of(dict(zip(PLACES.values(), values, strict=True)))
 
     def to_vector(self) -> np.ndarray:
         """Return the inverse of `from_vector`."""
-        return np.array([getattr(self, kind)[pair] for kind, pair in PLACES])
+        return np.array([getattr(self, kind)[pair] for kind, pair in PLACES.values()])
 
 
 @dataclass(frozen=True)
@@ -131,21 +136,10 @@ class Symmetric:
             "p34": (self.p34_i, 0.0),
             "p4": (self.p4_i, 0.0),
         }
-        return Weights.of({(kind, (d, e)): sides[kind][abs(d - e) == 3] for kind, (d, e) in PLACES})
+        return Weights.of({(kind, (d, e)): sides[kind][abs(d - e) == 3] for kind, (d, e) in PLACES.values()})
 
 
 AnyWeights = Symmetric | Weights
-
-HWS_WEIGHTS = Symmetric(p1_i=10.85, p1_c=6.73, p31_i=-2.48, p32_i=4.75, p33_i=0.191, p31_c=-0.34, p32_c=0.09, p4_i=1.0)
-"""The hard-wired system: printed in the caption of Fig. 3; P^2 and P^4 from Section 5.1.1."""
-
-LDVS_WEIGHTS = Symmetric(
-    p1_i=11.998, p1_c=5.999, p31_i=-9.32, p32_i=6.23, p33_i=0.083, p34_i=16.058, p31_c=-2.063, p32_c=0.081, p4_i=1.0
-)
-"""The linearly velocity-dependent system: printed in the caption of Fig. 4."""
-
-NO_WEIGHTS = Symmetric()
-"""No coordinating mechanism."""
 
 
 @lru_cache(maxsize=64)
