@@ -3,13 +3,12 @@
 import numpy as np
 
 import hexmj
-from hexmj.paper.found_sets import found_set
+from hexmj.paper.protocol import PRINTED, found_sets
 
 V = 0.6
 period = hexmj.Stride().periods(V)  # of a single leg [time units]
 starts = hexmj.draw_starts(1000, seed=1998)
-ideal = found_set("walk", V)
-assert ideal
+ideal = found_sets()["walk", V, V, PRINTED]
 for name, controller in {"HWS": hexmj.HWS, "LDVS": hexmj.LDVS, "ideal": ideal}.items():
     plan = hexmj.walk(starts, controller, V, 3 * period)
     lost = hexmj.walk_margin(plan) <= 0  # (step, start)

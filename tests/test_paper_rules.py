@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 
 from hexmj.paper.claims import Claim, claims
-from hexmj.paper.quantities import Faults, Losses, Measured, Phases, Scatter, main_peak
+from hexmj.paper.quantities import Gaits, Losses, Measured, main_peak
 from hexmj.paper.reproduce import Row, summary, verdict
-from hexmj.paper.rules import Answer, Band, Rule, Seen, Trend, fisher
+from hexmj.paper.rules import Answer, Band, Rule, Seen, fisher
 
 
 def losses(*rates: float, starts: int = 1000, velocities: tuple[float, ...] = (0.1, 0.2, 0.3)) -> xr.Dataset:
@@ -52,8 +52,8 @@ def test_rules_agree_if_every_interval_reaches_the_band():
     apart = answer_of(Band(Losses("ldvs", "hws"), (0.1, 0.3), most=0.0), measured, "walk")
     assert not apart.agrees and apart.value == pytest.approx(0.19) and apart.where == "V = 0.3"
     assert answer_of(Band(Losses("hws", "ldvs", 2.0), (0.1, 0.3), most=0.0), measured, "walk").agrees
-    assert answer_of(Trend(Losses("hws"), (0.1, 0.3), 1), measured, "walk").agrees
-    assert not answer_of(Trend(Losses("hws"), (0.1, 0.3), -1), measured, "walk").agrees
+    assert answer_of(Band(Losses("hws"), (0.1, 0.3), least=0.0, over="changes"), measured, "walk").agrees
+    assert not answer_of(Band(Losses("hws"), (0.1, 0.3), most=0.0, over="changes"), measured, "walk").agrees
 
 
 def test_a_range_whose_ends_are_not_met_is_not_judged():
@@ -70,18 +70,21 @@ def test_phases_are_judged_in_the_main_peak_and_the_others_counted():
     assert main_peak(phases).tolist() == [True, True, True, True, False]
     assert main_peak(np.array([0.99, 0.01, 0.02, 0.5])).tolist() == [True, True, True, False]
     measured = {"hws gaits": gaits(phases)}
-    answer = answer_of(Band(Phases("hws", "ipsilateral"), (0.5, 0.5), 0.66, 0.68), measured, "")
+    answer = answer_of(Band(Gaits("hws", "ipsilateral phase"), (0.5, 0.5), 0.66, 0.68), measured, "")
     assert answer.agrees and answer.value == pytest.approx(0.67)
-    assert not answer_of(Band(Phases("hws", "ipsilateral"), (0.5, 0.5), 0.7, 0.8), measured, "").agrees
-    outside = answer_of(Band(Scatter("hws", "phases"), (0.5, 0.5), 0.0, 0.0), measured, "")
+    assert not answer_of(Band(Gaits("hws", "ipsilateral phase"), (0.5, 0.5), 0.7, 0.8), measured, "").agrees
+    outside = answer_of(
+        Band(Gaits("hws", "part of starts outside the main peak of a pair"), (0.5, 0.5), 0.0, 0.0), measured, ""
+    )
     assert outside.value == pytest.approx(0.2) and not outside.agrees
 
 
 def test_phases_near_0_are_judged_on_the_circle():
     measured = {"hws gaits": gaits(np.array([0.98, 0.99, 0.01, 0.02]))}
-    assert abs(answer_of(Band(Phases("hws", "ipsilateral"), (0.5, 0.5), most=0.1), measured, "").value) < 1e-9
+    assert abs(answer_of(Band(Gaits("hws", "ipsilateral phase"), (0.5, 0.5), most=0.1), measured, "").value) < 1e-9
     measured["hws gaits"].phase[:, :, :4] = [0.98, 0.01, 0.02, 0.99]
-    spread = answer_of(Band(Scatter("hws", "pairs"), (0.5, 0.5), most=0.1), measured, "")
+    pairs = Gaits("hws", "largest - smallest phase, on the circle, of the ipsilateral pairs")
+    spread = answer_of(Band(pairs, (0.5, 0.5), most=0.1), measured, "")
     assert spread.agrees and spread.value == pytest.approx(0.04)
 
 
@@ -89,16 +92,18 @@ def test_an_unstable_regime_need_not_be_periodic():
     measured = {"hws regimes": gaits(np.full(4, 0.5))}
     measured["hws regimes"].stable[:] = [[True, True, False, False]]
     measured["hws regimes"].periodic[:] = [[True, False, True, False]]
-    for fault in ("unstable", "aperiodic"):
-        assert answer_of(Band(Faults("hws", fault), (0.5, 0.5), most=0.5), measured, "").value == 0.5
+    measured["hws gaits"] = measured["hws regimes"]
+    for how in ("without acceleration to an unstable", "with acceleration to an aperiodic"):
+        fault = Gaits("hws", f"part of starts that come {how} limit regime")
+        assert answer_of(Band(fault, (0.5, 0.5), most=0.5), measured, "").value == 0.5
 
 
 def test_a_mean_over_velocities_is_judged_on_the_same_starts():
     measured = {"hws": losses(0.1, 0.1, 0.4), "ldvs": losses(0.2, 0.2, 0.1)}
-    rule = Band(Losses("hws", "ldvs"), (0.1, 0.3), most=0.0, averaged=True)
+    rule = Band(Losses("hws", "ldvs"), (0.1, 0.3), most=0.0, over="mean")
     answer = answer_of(rule, measured, "walk")
     assert answer.value == pytest.approx(0.1 / 3) and not answer.agrees and answer.where == "V = 0.1, mean to 0.3"
-    assert not answer_of(replace(rule, averaged=False), measured, "walk").agrees
+    assert not answer_of(replace(rule, over="each"), measured, "walk").agrees
     assert "averaged over V in [0.1, 0.3]" in rule.words
 
 

@@ -33,5 +33,5 @@ class Reproduce(Command):
         with at_work(given, "reproducing") as execution, as_shipped():
             report = reproduce(given.out, chosen.protocol, chosen.only, chosen.beside, **execution)
         settings = {"protocol": asdict(report.protocol), "only": chosen.only, "beside": chosen.beside}
-        lines = ["The claims of the 1998 paper", *(table(*parts) for parts in report.tables()), *report.summary]
+        lines = ["The claims of the 1998 paper", table(*report.table()), *report.summary]
         return Answer(report.json(), lines, report.files, settings)

@@ -30,11 +30,6 @@ class Claim:
         """'calibrated' if a constant was inferred from the claim's number, else 'held out'."""
         return "calibrated" if self.calibrates else "held out"
 
-    @property
-    def command(self) -> str:
-        """The command that judges this claim."""
-        return f"hexmj reproduce --only {self.key}"
-
     def answers(self, measured: Measured) -> dict[str, Answer | None]:
         """Return the answer under each observation time, or one answer under '' if it depends on none."""
         times = OBSERVATION_TIMES if self.rule.quantity.windowed else ("",)
@@ -54,9 +49,7 @@ def in_physics() -> list[dict[str, str]]:
 
 
 def _read(entry: dict[str, Any]) -> Claim:
-    rule, quantity = dict(entry["rule"]), dict(entry["quantity"])
+    quantity, rule, calibrates = entry.pop("quantity"), entry.pop("rule"), tuple(entry.pop("calibrates", ()))
     measured = QUANTITIES[quantity.pop("kind")](**quantity)
-    velocities = tuple(rule.pop("velocities"))
-    judge = RULES[rule.pop("kind")](measured, velocities, **rule)
-    others = {name: value for name, value in entry.items() if name not in ("rule", "quantity", "calibrates")}
-    return Claim(**others, rule=judge, calibrates=tuple(entry.get("calibrates", ())))
+    judge = RULES[rule.pop("kind")](measured, tuple(rule.pop("velocities")), **rule)
+    return Claim(**entry, rule=judge, calibrates=calibrates)

@@ -12,7 +12,7 @@ import numpy as np
 from hexmj.legs import LEGS
 from hexmj.measures.tables import VELOCITY
 from hexmj.paper.measurements import NO_SET
-from hexmj.paper.quantities import kept_gaits, main_peak
+from hexmj.paper.quantities import kept, main_peak
 from hexmj.phases import PAIRS, circular_mean, wilson_phase
 from hexmj.plotting import picture
 from hexmj.timing import OBSERVATION_TIMES
@@ -20,7 +20,6 @@ from hexmj.walks import spans
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Measurements = Mapping[str, "xr.Dataset"]
@@ -71,10 +70,10 @@ def phase_figure(measured: Measurements, model: str) -> "tuple[Figure, xr.Datase
     v = gaits.velocity.values
     phase = np.full((len(RELATIVE), len(v), gaits.sizes["start"]), np.nan)  # (leg, velocity, start)
     peak = np.full((len(RELATIVE), len(v)), np.nan)
-    for i, (_, one) in enumerate(kept_gaits(gaits)):
-        second = one.phase.sel(pair="1-2").values
-        third = (second + one.phase.sel(pair="2-3").values) % 1.0
-        for row, values in enumerate((second, third)):
+    for i, at in enumerate(v):
+        one = kept(gaits.sel(velocity=at)).phase
+        second = one.sel(pair="1-2").values
+        for row, values in enumerate((second, (second + one.sel(pair="2-3").values) % 1.0)):
             phase[row, i, : len(values)] = values
             if len(values):
                 peak[row, i] = circular_mean(values[main_peak(values)])
@@ -103,32 +102,26 @@ def phase_histograms(measured: Measurements, model: str) -> "tuple[Figure, xr.Da
     """Draw the number of starts over their phase: a row for each pair of legs, a column for each of five velocities."""
     import xarray as xr
 
-    kept = list(kept_gaits(measured[f"{model} gaits"]))
-    kept = [kept[i] for i in np.unique(np.linspace(0, len(kept) - 1, 5).round().astype(int))]
-    edges = np.linspace(0, 1, BINS + 1)
-    counts = np.array([[np.histogram(one.phase.sel(pair=pair), edges)[0] for pair in PAIRS] for _, one in kept])
+    gaits = measured[f"{model} gaits"]
+    gaits = gaits.isel(velocity=np.unique(np.linspace(0, gaits.sizes["velocity"] - 1, 5).round().astype(int)))
+    v, edges = gaits.velocity.values, np.linspace(0, 1, BINS + 1)
+    stable = [kept(gaits.sel(velocity=at)).phase for at in v]
+    counts = np.array([[np.histogram(one.sel(pair=pair), edges)[0] for pair in PAIRS] for one in stable])
     figure = picture(8.6, 7.4)
-    panels = figure.subplots(len(PAIRS), len(kept), sharex=True, sharey="row", squeeze=False)
-    for row, pair in enumerate(PAIRS):
-        for column, (v, one) in enumerate(kept):
-            axes: Axes = panels[row, column]
-            axes.stairs(counts[column, row], edges, fill=True, color=MODELS[model])
-            axes.set(xlim=(0, 1), ylim=(0, 1.15 * max(1, counts.max())), xticks=(0, 0.5, 1))
-            axes.xaxis.set_major_formatter("{x:g}")
-            if row == 0:
-                axes.set_title(f"$V$ = {v:g}\n{one.sizes['start']} stable gaits", fontsize=10)
-        panels[row, 0].set_ylabel(f"$\\Phi$ {pair}", rotation=0, ha="right", va="center", fontsize=12)
+    panels = figure.subplots(len(PAIRS), len(v), sharex=True, sharey="row", squeeze=False)
+    for (row, column), axes in np.ndenumerate(panels):
+        axes.stairs(counts[column, row], edges, fill=True, color=MODELS[model])
+        axes.set(xlim=(0, 1), ylim=(0, 1.15 * max(1, counts.max())), xticks=(0, 0.5, 1))
+        axes.xaxis.set_major_formatter("{x:g}")
+    for axes, at, one in zip(panels[0], v, stable, strict=True):
+        axes.set_title(f"$V$ = {at:g}\n{one.sizes['start']} stable gaits", fontsize=10)
+    for axes, pair in zip(panels[:, 0], PAIRS, strict=True):
+        axes.set_ylabel(f"$\\Phi$ {pair}", rotation=0, ha="right", va="center", fontsize=12)
     figure.supxlabel("relative phase", fontsize=11)
     figure.supylabel("number of starts", fontsize=11)
-    data = xr.Dataset(
-        {"starts": (("velocity", "pair", "bin"), counts, {"units": "1"})},
-        {
-            "velocity": ("velocity", [v for v, _ in kept], VELOCITY),
-            "pair": list(PAIRS),
-            "bin": ("bin", (edges[:-1] + edges[1:]) / 2, {"units": "1", "long_name": "relative phase"}),
-        },
-    )
-    return figure, data
+    middle = (edges[:-1] + edges[1:]) / 2, {"units": "1", "long_name": "relative phase"}
+    coordinates = {"velocity": ("velocity", v, VELOCITY), "pair": list(PAIRS), "bin": ("bin", *middle)}
+    return figure, xr.Dataset({"starts": (("velocity", "pair", "bin"), counts, {"units": "1"})}, coordinates)
 
 
 def footfall_diagrams(measured: Measurements, model: str) -> "tuple[Figure, xr.Dataset]":
@@ -161,17 +154,12 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
         xr.DataArray(list(curves), dims="curve", name="curve"),
         combine_attrs="drop_conflicts",
     )
-    missing = []
     for name, (label, style) in curves.items():
         one = data.sel(curve=name).dropna("velocity")
-        if one.sizes["velocity"]:
-            look: dict[str, Any] = {"linewidth": 1.3, "capsize": 3} | style
-            axes.errorbar(one.velocity, one.flss, one.sample_sd, label=label, **look)
-        else:
-            missing.append(label)
+        look: dict[str, Any] = {"linewidth": 1.3, "capsize": 3} | style
+        label += "" if one.sizes["velocity"] else ": not yet searched"
+        axes.errorbar(one.velocity, one.flss, one.sample_sd, label=label, **look)
     axes.set(xlabel="velocity $V$", ylabel="FLSS", xlim=(0, 1), ylim=(-0.02, 1.04))
-    for label in missing:
-        axes.plot([], [], " ", label=f"{label}: not yet searched")
     axes.legend(frameon=False, fontsize=10)
     return figure, data
 

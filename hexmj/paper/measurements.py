@@ -9,17 +9,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hexmj.controllers.cruse1998 import Cruse1998
-from hexmj.controllers.planning import begin, planned_losses
+from hexmj.controllers.planning import begin, first_losses, planned_losses
 from hexmj.controllers.protocol import SteerableController
 from hexmj.gaits import steady_state_gait
 from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
 from hexmj.phases import PAIRS
-from hexmj.starts import checked_starts, draw_starts
-from hexmj.studies.disturbed_plans import Disturbed, DisturbedPlan, collect_postures
+from hexmj.starts import draw_starts
+from hexmj.studies.disturbed_plans import Disturbed, collect_postures
 from hexmj.studies.disturbed_walks import disturbance_of, find_stable_starts
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
 
@@ -56,19 +55,16 @@ def losses(
         sets: the network for each of `OBSERVATION_TIMES`.
         late: count only losses after `LATE_PERIODS`.
     """
-    starts = draw_starts(n_starts, seed, stride)
+    starts, at = draw_starts(n_starts, seed, stride), np.full(n_starts, velocity)
     lost = np.full((len(OBSERVATION_TIMES), n_starts), NO_SET, dtype=np.int8)
+    unseen = int(steps_within(stride.periods(velocity, LATE_PERIODS), stride)) if late else 0
     for network in dict.fromkeys(filter(None, sets)):
         rows = [row for row, other in enumerate(sets) if other == network]
-        times = [observation_duration(OBSERVATION_TIMES[row], np.array(velocity), stride, acceleration) for row in rows]
-        durations = np.array(times)
-        if late:
-            wait = stride.periods(velocity, LATE_PERIODS)
-            lost[rows] = lost_after(starts, network, velocity, wait, durations, stride=stride, threads=threads)
-        else:
-            how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
-            first = first_loss(starts, network, velocity, durations.max(), **how)
-            lost[rows] = first < (steps_within(durations, stride)[:, np.newaxis] + 0.5) * stride.dt
+        times = [observation_duration(OBSERVATION_TIMES[row], velocity, stride, acceleration) for row in rows]
+        seen = steps_within(times, stride)
+        plan, longest = network.begin(starts, at, stride, acceleration, threads), int(seen.max())
+        first = plan.first_losses_after(unseen, longest) if late else first_losses(plan, longest, threads)
+        lost[rows] = (first > 0) & (first <= unseen + seen[:, np.newaxis])
     return _lost(lost)
 
 
@@ -76,33 +72,6 @@ def _lost(lost: np.ndarray) -> "xr.Dataset":
     import xarray as xr
 
     return xr.Dataset({"lost": (("observation_time", "start"), lost)}, {"observation_time": list(OBSERVATION_TIMES)})
-
-
-def lost_after(
-    starts: ArrayLike,
-    controller: Cruse1998,
-    velocity: float,
-    wait: float,
-    durations: ArrayLike,
-    *,
-    stride: Stride,
-    threads: int | None = None,
-) -> np.ndarray:
-    """Return whether each start is statically unstable within `durations` after the first `wait` of its walk.
-
-    Args:
-        starts: (start, leg) tips at time 0 [mm].
-        wait: time at the beginning that does not count, at least one step [time units].
-        durations: observation times after it, (duration,) [time units].
-
-    Returns:
-        (duration, start)
-    """
-    x = checked_starts(starts, stride)
-    plan = controller.begin(x, np.full(len(x), velocity), stride, threads=threads)
-    unseen, seen = int(steps_within(wait, stride)), steps_within(durations, stride)
-    first = plan.first_losses_after(unseen, int(seen.max()))
-    return (first > 0) & (first <= unseen + seen[:, np.newaxis])
 
 
 def limit_regimes(
@@ -194,14 +163,10 @@ def losses_after(
         postures = replace(postures, standing=np.ones_like(postures.standing))
     disturbed = Disturbed(controller, halt, postures, slows=acceleration is not None)
 
-    def plan() -> DisturbedPlan:
-        begun = begin(disturbed, stable.starts, velocity, stride, acceleration, threads)
-        return begun  # pyright: ignore[reportReturnType]
-
-    ahead = plan()
+    ahead, plan = (begin(disturbed, stable.starts, velocity, stride, acceleration, threads) for _ in range(2))
     ahead.advance(int(halt.step.max()) + 1)
-    back = ahead.resumed * stride.dt + (acceleration.duration(velocity) if acceleration else 0.0)
+    resumed: np.ndarray = ahead.resumed  # pyright: ignore[reportAttributeAccessIssue]  # a DisturbedPlan
+    back = resumed * stride.dt + (acceleration.duration(velocity) if acceleration else 0.0)
     steps = steps_within([back + observation_duration(time, velocity, stride) for time in OBSERVATION_TIMES], stride)
-    first = planned_losses(plan(), steps.max(axis=0), threads)
-    lost = ((first > 0) & (first <= steps)).astype(np.int8)
-    return _lost(lost)
+    first = planned_losses(plan, steps.max(axis=0), threads)
+    return _lost(((first > 0) & (first <= steps)).astype(np.int8))

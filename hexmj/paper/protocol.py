@@ -2,16 +2,22 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
-from hexmj.controllers.cruse1998 import MODEL_VARIANTS, PRESETS, Cruse1998, ModelVariant, Order
-from hexmj.paper.found_sets import found_set
+from hexmj.controllers.cruse1998 import MODEL_VARIANTS, PRESETS, Cruse1998, ModelVariant, Order, Symmetric
+from hexmj.files import read_toml
 from hexmj.paper.measurements import footfalls, limit_regimes, losses, losses_after
 from hexmj.starts import MOST_STARTS, SAMPLE, checked_list
 from hexmj.sweep import Cell
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
 from hexmj.validate import whole
+
+PRINTED = MODEL_VARIANTS["printed"]
+
+FOUND = Path(__file__).with_name("ideal.toml")
+"""Table of the weight sets that searches found."""
 
 OWN = {variant: name for name, variant in MODEL_VARIANTS.items() if name != "printed"}
 """Model variants under which our own presets were searched -> beginning of their names, instead of 'own'."""
@@ -19,6 +25,28 @@ OWN = {variant: name for name, variant in MODEL_VARIANTS.items() if name != "pri
 RANGES = {"wide": (0.1, 0.7), "hws again": (0.1, 0.45), "ldvs again": (0.1, 0.5)}
 """Problem 2: found sets -> the range W of their search. 'again' are the paper's two problems; on the wide range the
 paper could not fit a hard-wired system."""
+
+Place = tuple[str, float, float, ModelVariant]
+"""Observation time, least and greatest velocity, and model variant for which a set was searched."""
+
+
+@cache
+def found_sets(path: Path = FOUND) -> dict[Place, Cruse1998]:
+    """Return all sets that searches found; Problem 1 has one velocity, Problem 2 a range."""
+    found = {}
+    for entry in read_toml(path)["set"]:
+        velocities, time = entry["velocities"], entry["observation_time"]
+        model_variant = MODEL_VARIANTS[entry.get("model_variant", "printed")]
+        weights = Symmetric(**{name: float(value) for name, value in entry["symmetric"].items()})
+        name = f"ideal for {time}, V = {' to '.join(map(str, velocities))}"
+        place = time, velocities[0], velocities[-1], model_variant
+        found[place] = Cruse1998(weights, name=name, model_variant=model_variant)
+    return found
+
+
+def searched_seeds() -> set[int]:
+    """Return the seeds of these searches and of their starts."""
+    return {entry["seed"] for entry in read_toml(FOUND)["set"]}
 
 
 @dataclass(frozen=True)
@@ -74,7 +102,7 @@ class Protocol:
             found = PRESETS.get(f"{OWN.get(self.model_variant, 'own')}-{velocity:g}")
         elif name == "ideal" or name in RANGES:
             velocities = RANGES.get(name, (velocity, velocity))
-            found = found_set(observation_time, *velocities, model_variant=self.model_variant)
+            found = found_sets().get((observation_time, *velocities, self.model_variant))
         else:
             found = PRESETS[name]
         return found and replace(found, order=self.order, model_variant=self.model_variant)

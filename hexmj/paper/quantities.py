@@ -3,16 +3,17 @@
 Two curves of FLSS are compared on the same starts.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hexmj.controllers.cruse1998 import ModelVariant
-from hexmj.paper.found_sets import PRINTED, found_sets
 from hexmj.paper.measurements import NO_SET
-from hexmj.phases import CONTRALATERAL, IPSILATERAL, GaitName, circular_range, classify, unrolled, wilson_phase
+from hexmj.paper.protocol import PRINTED, found_sets
+from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_range, classify, unrolled, wilson_phase
 from hexmj.stats import WILSON_Z, wilson_interval
 
 if TYPE_CHECKING:
@@ -31,6 +32,15 @@ class Measured:
     model_variant: ModelVariant = PRINTED
 
 
+class Estimate(NamedTuple):
+    """A value with its 95 % interval, and where it was measured."""
+
+    value: float
+    low: float
+    high: float
+    where: str
+
+
 @dataclass(frozen=True)
 class Point:
     """A quantity at one velocity."""
@@ -42,16 +52,16 @@ class Point:
     """(start,)"""
 
     @property
-    def estimate(self) -> tuple[float, float, float]:
-        """Mean and 95 % interval: Wilson's for frequencies, else the normal one; NaN without starts."""
-        n = len(self.values)
+    def estimate(self) -> Estimate:
+        """The mean, with Wilson's interval for frequencies, else the normal one; NaN without starts."""
+        n, where = len(self.values), f"V = {self.velocity:g}" + (f", {self.of}" if self.of else "")
         if n == 0:
-            return np.nan, np.nan, np.nan
+            return Estimate(np.nan, np.nan, np.nan, where)
         mean = float(self.values.mean())
         if self.values.dtype == bool:
-            return mean, *wilson_interval(int(self.values.sum()), n)
+            return Estimate(mean, *wilson_interval(int(self.values.sum()), n), where)
         half = WILSON_Z * float(self.values.std(ddof=1)) / np.sqrt(n) if n > 1 else 0.0
-        return mean, mean - half, mean + half
+        return Estimate(mean, mean - half, mean + half, where)
 
 
 @dataclass(frozen=True)
@@ -92,109 +102,33 @@ class Losses:
 
 
 @dataclass(frozen=True)
-class _OfGaits:
-    """Base of the quantities of a preset's accelerated gaits, which depend on no observation time."""
+class Gaits:
+    """A property of a preset's steady-state gaits, which depends on no observation time."""
 
     model: str
+    what: str
+    """A key of `PROPERTIES`."""
+    minus_wilson: bool = False
+    """Subtract the phase 1/(1 + V) of Wilson's model."""
     windowed = False
 
     @property
-    def needs(self) -> tuple[str, ...]:
-        """Names of the measurements."""
-        return (f"{self.model} gaits",)
-
-
-@dataclass(frozen=True)
-class Phases(_OfGaits):
-    """Relative phases in the main peak of the gaits that are periodic and never lost static stability."""
-
-    pairs: Literal["ipsilateral", "contralateral"]
-    minus_wilson: bool = False
-
-    @property
     def words(self) -> str:
         """The quantity in words."""
-        return f"{self.pairs} phase({self.model})" + (" - 1/(1 + V)" if self.minus_wilson else "")
-
-    def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """Yield a point for each velocity and pair of legs."""
-        for v, one in kept_gaits(measured.data[self.needs[0]]):
-            for pair in one.pair.values[IPSILATERAL if self.pairs == "ipsilateral" else CONTRALATERAL].tolist():
-                phase = one.phase.sel(pair=pair).values
-                shift = float(wilson_phase(v)) if self.minus_wilson else 0.0
-                yield Point(v, pair, unrolled(phase[main_peak(phase)]) - shift)
-
-
-@dataclass(frozen=True)
-class Faults(_OfGaits):
-    """Part of all starts whose steady-state gait is aperiodic or unstable, without acceleration or with it."""
-
-    fault: Literal["aperiodic", "unstable"]
-    accelerated: bool = False
-
-    @property
-    def words(self) -> str:
-        """The quantity in words."""
-        how = "with" if self.accelerated else "without"
-        return f"part of starts that come {how} acceleration to an {self.fault} limit regime({self.model})"
+        return f"{self.what}({self.model})" + (" - 1/(1 + V)" if self.minus_wilson else "")
 
     @property
     def needs(self) -> tuple[str, ...]:
         """Names of the measurements."""
-        return (f"{self.model} gaits" if self.accelerated else f"{self.model} regimes",)
+        return (f"{self.model} {PROPERTIES[self.what][0]}",)
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """Yield a point for each velocity."""
-        gaits = measured.data[self.needs[0]]
+        """Yield a point for each velocity, and for each pair of legs if the property is one of pairs."""
+        gaits, values = measured.data[self.needs[0]], PROPERTIES[self.what][1]
         for v in gaits.velocity.values.tolist():
-            one = gaits.sel(velocity=v)
-            yield Point(v, "", ~(one.periodic if self.fault == "aperiodic" else one.stable).values.astype(bool))
-
-
-@dataclass(frozen=True)
-class Scatter(_OfGaits):
-    """Spread of the gaits: of periods over legs, of phases over ipsilateral pairs or over starts."""
-
-    of: Literal["periods", "pairs", "phases"]
-
-    @property
-    def words(self) -> str:
-        """The quantity in words."""
-        words = {
-            "periods": "(longest - shortest) / mean period of the legs",
-            "pairs": "largest - smallest phase, on the circle, of the ipsilateral pairs",
-            "phases": "part of starts outside the main peak of a pair",
-        }
-        return f"{words[self.of]}({self.model})"
-
-    def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """Yield a point for each velocity; of phases for each pair, too."""
-        for v, one in kept_gaits(measured.data[self.needs[0]]):
-            if self.of == "periods":
-                yield Point(v, "", np.ptp(one.periods.values, axis=1) / one.periods.values.mean(axis=1))
-            elif self.of == "pairs":
-                yield Point(v, "", circular_range(one.phase.values[:, IPSILATERAL]))
-            else:
-                for pair in one.pair.values.tolist():
-                    yield Point(v, pair, ~main_peak(one.phase.sel(pair=pair).values))
-
-
-@dataclass(frozen=True)
-class Gait(_OfGaits):
-    """Part of the gaits that have a name; the phases of the left side and of the front legs decide."""
-
-    name: GaitName
-
-    @property
-    def words(self) -> str:
-        """The quantity in words."""
-        return f"part of gaits that are {self.name}({self.model})"
-
-    def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """Yield a point for each velocity."""
-        for v, one in kept_gaits(measured.data[self.needs[0]]):
-            phases = one.phase.sel(pair=["1-2", "2-3", "1-4"]).values
-            yield Point(v, "", np.array([classify(*three) == self.name for three in phases.tolist()], dtype=bool))
+            shift = float(wilson_phase(v)) if self.minus_wilson else None
+            for pair, numbers in values(gaits.sel(velocity=v)):
+                yield Point(v, pair, numbers if shift is None else numbers - shift)
 
 
 @dataclass(frozen=True)
@@ -213,36 +147,69 @@ class Weight:
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
         """Yield a point for each set that was found under the model variant."""
-        for one in found_sets():
-            if one.place == (observation_time, one.low, one.low, measured.model_variant):
-                value = getattr(one.controller.weights, self.parameter)
+        for (time, low, high, variant), network in found_sets().items():
+            if (time, high, variant) == (observation_time, low, measured.model_variant):
+                value = getattr(network.weights, self.parameter)
                 if self.over:
                     with np.errstate(divide="ignore", invalid="ignore"):
-                        value = abs(np.float64(value) / getattr(one.controller.weights, self.over))
-                yield Point(one.low, "", np.array([value]))
+                        value = abs(np.float64(value) / getattr(network.weights, self.over))
+                yield Point(low, "", np.array([value]))
 
 
-Quantity = Losses | Phases | Faults | Scatter | Gait | Weight
+Quantity = Losses | Gaits | Weight
 
-QUANTITIES: dict[str, Any] = {
-    "losses": Losses,
-    "phases": Phases,
-    "faults": Faults,
-    "scatter": Scatter,
-    "gait": Gait,
-    "weight": Weight,
-}
+QUANTITIES: dict[str, Any] = {"losses": Losses, "gaits": Gaits, "weight": Weight}
 """Classes by their kind in `claims.toml`."""
 
+Values = Iterable[tuple[str, np.ndarray]]
+"""Pairs of legs, or an empty text for all legs, each with the values of all starts, (start,)."""
 
-def kept_gaits(gaits: "xr.Dataset") -> "Iterator[tuple[float, xr.Dataset]]":
-    """Yield at each velocity the starts that Section 5.3 takes: with a periodic gait, and stable all the way."""
-    for v in gaits.velocity.values.tolist():
-        one = gaits.sel(velocity=v)
-        yield v, one.isel(start=np.flatnonzero(one.periodic & one.stable & ~one.lost))
+
+def kept(gaits: "xr.Dataset") -> "xr.Dataset":
+    """Return the starts that Section 5.3 takes, at one velocity: with a periodic gait, and stable all the way."""
+    return gaits.isel(start=np.flatnonzero(gaits.periodic & gaits.stable & ~gaits.lost))
 
 
 def main_peak(phase: np.ndarray) -> np.ndarray:
     """Return which phases, (start,), lie within `PEAK` of the phase that has most of the others this close."""
     near = np.abs((phase[:, np.newaxis] - phase + 0.5) % 1.0 - 0.5) <= PEAK
     return near[near.sum(axis=1).argmax()] if len(phase) else np.zeros(0, dtype=bool)
+
+
+def _phases(gaits: "xr.Dataset", pairs: slice) -> Values:
+    """Yield the phases of each pair in its main peak."""
+    for pair in gaits.pair.values[pairs].tolist():
+        phase = kept(gaits).phase.sel(pair=pair).values
+        yield pair, unrolled(phase[main_peak(phase)])
+
+
+def _outside(gaits: "xr.Dataset") -> Values:
+    for pair in gaits.pair.values.tolist():
+        yield pair, ~main_peak(kept(gaits).phase.sel(pair=pair).values)
+
+
+def _range_of_periods(gaits: "xr.Dataset") -> Values:
+    periods = kept(gaits).periods.values
+    yield "", np.ptp(periods, axis=1) / periods.mean(axis=1)
+
+
+def _positive_metachrony(gaits: "xr.Dataset") -> Values:
+    """Yield which gaits have this name; the phases of the left side and of the front legs decide."""
+    phases = kept(gaits).phase.sel(pair=["1-2", "2-3", "1-4"]).values
+    yield "", np.array([classify(*three) == "positive metachrony" for three in phases.tolist()], dtype=bool)
+
+
+PROPERTIES: "dict[str, tuple[str, Callable[[xr.Dataset], Values]]]" = {
+    "ipsilateral phase": ("gaits", partial(_phases, pairs=IPSILATERAL)),
+    "contralateral phase": ("gaits", partial(_phases, pairs=CONTRALATERAL)),
+    "(longest - shortest) / mean period of the legs": ("gaits", _range_of_periods),
+    "largest - smallest phase, on the circle, of the ipsilateral pairs": (
+        "gaits", lambda gaits: [("", circular_range(kept(gaits).phase.values[:, IPSILATERAL]))]),
+    "part of starts outside the main peak of a pair": ("gaits", _outside),
+    "part of gaits that are positive metachrony": ("gaits", _positive_metachrony),
+    "part of starts that come with acceleration to an aperiodic limit regime": (
+        "gaits", lambda gaits: [("", gaits.periodic.values == 0)]),
+    "part of starts that come without acceleration to an unstable limit regime": (
+        "regimes", lambda gaits: [("", gaits.stable.values == 0)]),
+}  # fmt: skip
+"""Properties of `Gaits`, each with its measurement, and its values in the gaits of one velocity."""

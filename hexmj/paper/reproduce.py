@@ -1,8 +1,8 @@
 """`hexmj reproduce`: measure, judge every claim of the paper, draw its figures."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -14,14 +14,13 @@ from hexmj.files import write_text
 from hexmj.measures.tables import VELOCITY
 from hexmj.paper.claims import Claim, claims, in_physics
 from hexmj.paper.figures import FIGURES, SAMPLES
-from hexmj.paper.found_sets import found_sets
-from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, Reproduction, cells
+from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, Reproduction, cells, searched_seeds
 from hexmj.paper.quantities import Measured
 from hexmj.paper.rules import Answer
 from hexmj.progress import part_of, shown
 from hexmj.sweep import Execution, over_axes, run_cells
 from hexmj.timing import OBSERVATION_TIMES
-from hexmj.validate import distinct
+from hexmj.validate import choice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,10 +29,9 @@ MEASURED = "measurements"
 """Directory of the cached measurements, beside the results."""
 
 NOT_SEARCHED = "not yet searched"
-SAME = "same"
-"""Stands under the second observation time if a claim depends on none."""
 
-KINDS = ("held out", "calibrated")
+Answers = dict[str, Answer | None]
+"""Answers by observation time, or one under '' if it does not matter; None if a set has not been searched yet."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +39,8 @@ class Row:
     """A claim with our answers."""
 
     claim: Claim
-    answers: dict[str, Answer | None]
-    """By observation time, or one under '' if the claim depends on none; None if a set has not been searched yet."""
-    beside: dict[str, dict[str, Answer | None]] = field(default_factory=dict)
+    answers: Answers
+    beside: dict[str, Answers] = field(default_factory=dict)
     """The answers under other model variants, by name."""
 
     @property
@@ -59,10 +56,29 @@ class Row:
         """The known reason, if we differ."""
         return self.claim.why if "differs" in map(verdict, self.answers.values()) else ""
 
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The row as texts: the paper's words, the answers under all variants and observation times, fits and why."""
+        claim, cells = self.claim, []
+        for answers in (self.answers, *self.beside.values()):
+            cells += [*map(_cell, answers.values()), "same"][: len(OBSERVATION_TIMES)]
+        kind = "; ".join(claim.calibrates)
+        kind = f"{claim.kind}: {kind}" if kind else claim.kind
+        return claim.section, claim.text, claim.value, kind, *cells, self.fits, self.why
+
 
 def verdict(answer: Answer | None) -> str:
     """Return 'agrees', 'differs' or that a set has not been searched yet."""
     return NOT_SEARCHED if answer is None else "agrees" if answer.agrees else "differs"
+
+
+def _cell(answer: Answer | None) -> str:
+    """Return verdict and number."""
+    if answer is None:
+        return NOT_SEARCHED
+    interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
+    number = "no value" if answer.value != answer.value else f"{answer.value:.4f}{interval}"
+    return f"{verdict(answer)}: {number} at {answer.where}"
 
 
 @dataclass(frozen=True)
@@ -73,65 +89,59 @@ class Report:
     protocol: Protocol
     files: list[Path] = field(default_factory=list)
 
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Return the heads and rows of a table of our answers, under other model variants too."""
+        names = ("ours", *self.rows[0].beside)
+        answers = (f"{name}, {time}" for name in names for time in OBSERVATION_TIMES)
+        heads = "section", "the paper", "its value", "kind", *answers, "fits", "why"
+        return heads, [row.cells for row in self.rows]
+
     @property
-    def variants(self) -> list[str]:
-        """Names of the other model variants."""
-        return list(self.rows[0].beside)
-
-    def tables(self) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
-        """Return the heads and rows of a table of our answers, and of one for each other model variant."""
-        heads = _heads()
-        tables = [(heads, [_cells(replace(row, beside={})) for row in self.rows])]
-        for name in self.variants:
-            rows = [(*_paper(row), *_answered(row.beside[name])) for row in self.rows]
-            tables.append(((*heads[:3], *(f"{name}, {time}" for time in OBSERVATION_TIMES)), rows))
-        return tables
-
-    @cached_property
     def summary(self) -> list[str]:
         """Sentences that count the verdicts, and say if the starts are those of the searches."""
         lines = summary(self.rows)
-        if (seed := self.protocol.seed) in {one.seed for one in found_sets()}:
+        if (seed := self.protocol.seed) in searched_seeds():
             lines.append(f"seed {seed}: ideal sets were searched on these starts, where they look better than they are")
-        for name in self.variants:
-            counts = summary([Row(row.claim, row.beside[name]) for row in self.rows])
-            lines += [f"model variant {name}, {count}" for count in counts]
+        for name in self.rows[0].beside:
+            rows = [Row(row.claim, row.beside[name]) for row in self.rows]
+            lines += [f"model variant {name}, {line}" for line in summary(rows)]
         return lines
 
     def markdown(self) -> str:
         """Return the table, the rule of every row, and the command that recomputes it."""
-        p = self.protocol
+        p, (heads, rows) = self.protocol, self.table()
         size = f"{p.samples} times {p.sample} starts, gaits from {p.gait_starts} starts"
         head = f"{size}; seed {p.seed}.  An answer is the number that strains the rule most, with its 95 % interval,"
-        lines = ["# The claims of the 1998 paper", "", f"{head} and where.", ""]
-        lines += [*(f"- {sentence}" for sentence in self.summary), ""]
-        rows = [[cell.replace("differs:", "**differs**:") for cell in _cells(row)] for row in self.rows]
-        lines += [*io.markdown_table(_heads(self.variants), rows), "", "## Rules and commands", ""]
+        rows = [[cell.replace("differs:", "**differs**:") for cell in row] for row in rows]
         rules = [(row.claim.text, row.claim.rule.words, f"`{self.command(row)}`") for row in self.rows]
-        lines += io.markdown_table(("the paper", "agrees if", "command"), rules)
-        lines += ["", "## Judged in physics", "", "Plans cannot answer these; docs/experiments.md does.", ""]
-        lines += [f"- {one['topic']} (Section 6): {one['text']}; `{one['command']}`" for one in in_physics()]
+        lines = [
+            "# The claims of the 1998 paper", "", f"{head} and where.", "",
+            *(f"- {sentence}" for sentence in self.summary), "",
+            *io.markdown_table(heads, rows), "", "## Rules and commands", "",
+            *io.markdown_table(("the paper", "agrees if", "command"), rules), "",
+            "## Judged in physics", "", "Plans cannot answer these; docs/experiments.md does.", "",
+            *(f"- {one['topic']} (Section 6): {one['text']}; `{one['command']}`" for one in in_physics()),
+        ]  # fmt: skip
         return "\n".join(lines) + "\n"
 
     def json(self) -> dict[str, Any]:
         """Return the same as plain numbers and texts."""
         rows = []
         for row in self.rows:
-            claim = row.claim
+            claim, beside = row.claim, {name: _plain(answers) for name, answers in row.beside.items()}
             paper = {"key": claim.key, "section": claim.section, "paper": claim.text, "value": claim.value}
             paper |= {"kind": claim.kind, "calibrates": list(claim.calibrates)}
-            beside = {name: _plain(answers) for name, answers in row.beside.items()}
-            how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": self.command(row)}
+            how = {"rule": claim.rule.words, "fits": row.fits, "why": row.why, "command": self.command(row)}
             rows.append(paper | {"ours": _plain(row.answers), "beside": beside} | how)
         return {"claims": rows, "summary": self.summary, "protocol": asdict(self.protocol)}
 
     def command(self, row: Row) -> str:
         """Return the command that recomputes a row with the same starts and model variants."""
         seed = self.protocol.seed
-        quick = self.protocol == Reproduction(quick=True, seed=seed).protocol
-        words = [row.claim.command, *(["--quick"] if quick else [])]
+        words = ["hexmj reproduce --only", row.claim.key]
+        words += ["--quick"] if self.protocol == Reproduction(quick=True, seed=seed).protocol else []
         words += [f"--seed {seed}"] if seed != FULL.seed else []
-        words += [f"--beside {' '.join(row.beside)}"] if row.beside else []
+        words += ["--beside", *row.beside] if row.beside else []
         return " ".join(words)
 
 
@@ -156,12 +166,10 @@ def reproduce(
     Raises:
         InputError: no such claim or model variant, or a number of samples that the figures do not draw.
     """
-    if unknown := [key for key in only if key not in claims()]:
-        raise InputError(f"claim {unknown[0]!r}; valid keys: {', '.join(claims())}")
+    for key in only:
+        choice("claim", key, claims())
     if not only and protocol.samples != SAMPLES:
         raise InputError(f"samples = {protocol.samples}; the figures draw {SAMPLES}")
-    if beside:
-        distinct("beside", ["printed", *beside])
     variants = {name: named_variant(name) for name in beside}
     out = io.results_folder(out)
     judged = [claim for key, claim in claims().items() if not only or key in only]
@@ -212,53 +220,20 @@ def summary(rows: Sequence[Row]) -> list[str]:
     """Return sentences that count the verdicts, those of calibrated claims separately."""
     lines = []
     for time in (*OBSERVATION_TIMES, ""):
-        judged = [row for row in rows if time in row.answers]
-        verdicts = {kind: [verdict(row.answers[time]) for row in judged if row.claim.kind == kind] for kind in KINDS}
-        counts = [f"{kind} {_counts(of_kind)}" for kind, of_kind in verdicts.items()]
+        counts = []
+        for kind in ("held out", "calibrated"):
+            answers = [row.answers[time] for row in rows if time in row.answers and row.claim.kind == kind]
+            found = Counter(map(verdict, answers))
+            some = [f"{found[one]} {one}" for one in ("agrees", "differs", NOT_SEARCHED) if one in found]
+            counts.append(f"{kind} {', '.join(some) or 'none judged'}")
         of = f"claims on FLSS and sets, observation time {time}" if time else "claims on gaits"
         lines.append(f"{of}: {'; '.join(counts)}")
-    fits = [row.fits for row in rows if row.fits]
-    counts = ", ".join(f"{name} {fits.count(name)}" for name in ("both", *OBSERVATION_TIMES, "neither"))
+    fits = Counter(row.fits for row in rows)
+    counts = ", ".join(f"{name} {fits[name]}" for name in ("both", *OBSERVATION_TIMES, "neither"))
     return [*lines, f"which observation time the paper's numbers fit: {counts}"]
 
 
-def _counts(verdicts: Sequence[str]) -> str:
-    counts = [f"{verdicts.count(one)} {one}" for one in ("agrees", "differs", NOT_SEARCHED) if one in verdicts]
-    return ", ".join(counts) or "none judged"
-
-
-def _heads(variants: Sequence[str] = ()) -> tuple[str, ...]:
-    answers = (f"{name}, {time}" for name in ("ours", *variants) for time in OBSERVATION_TIMES)
-    return "section", "the paper", "its value", "kind", *answers, "fits", "why"
-
-
-def _cells(row: Row) -> tuple[str, ...]:
-    """Return the cells of `_heads`, of the other model variants too."""
-    claim = row.claim
-    kind = f"{claim.kind}: {'; '.join(claim.calibrates)}" if claim.calibrates else claim.kind
-    answered = [cell for answers in (row.answers, *row.beside.values()) for cell in _answered(answers)]
-    return *_paper(row), kind, *answered, row.fits, row.why
-
-
-def _paper(row: Row) -> tuple[str, str, str]:
-    return row.claim.section, row.claim.text, row.claim.value
-
-
-def _answered(answers: Mapping[str, Answer | None]) -> list[str]:
-    """Return verdict and number under each observation time."""
-
-    def cell(answer: Answer | None) -> str:
-        if answer is None:
-            return NOT_SEARCHED
-        interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
-        number = "no value" if answer.value != answer.value else f"{answer.value:.4f}{interval}"
-        return f"{verdict(answer)}: {number} at {answer.where}"
-
-    cells = [cell(answer) for answer in answers.values()]
-    return cells + [SAME] * (len(OBSERVATION_TIMES) - len(cells))
-
-
-def _plain(answers: Mapping[str, Answer | None]) -> dict[str, dict[str, Any]]:
+def _plain(answers: Answers) -> dict[str, dict[str, Any]]:
     """Return verdicts and numbers by observation time."""
     return {
         time or "any": {"verdict": verdict(answer)} | (asdict(answer) if answer else {})

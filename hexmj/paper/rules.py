@@ -1,4 +1,4 @@
-"""Rules of the paper's claims: a quantity, velocities, and a band, a count or a trend."""
+"""Rules of the paper's claims: a quantity, velocities, and a band or a count."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,10 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hexmj.paper.quantities import Measured, Point, Quantity
-
-Estimate = tuple[float, float, float]
-"""A value and its 95 % interval."""
+from hexmj.paper.quantities import Estimate, Measured, Point, Quantity
 
 LEVEL = 0.05
 """Probability below which two counts are not of one frequency."""
@@ -31,11 +28,26 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class _OverRange:
+class Rule:
     """Base of the rules: a quantity over a range of velocities, whose ends must be measured."""
 
     quantity: Quantity
     velocities: tuple[float, float]
+
+    @property
+    def words(self) -> str:
+        """The rule in words."""
+        raise NotImplementedError
+
+    def judged(self, points: list[Point]) -> Answer:
+        """Judge the points of the range."""
+        raise NotImplementedError
+
+    @property
+    def span(self) -> str:
+        """The velocities in words."""
+        low, high = self.velocities
+        return f"V = {low:g}" if low == high else f"V in [{low:g}, {high:g}]"
 
     def answer(self, measured: Measured, observation_time: str) -> Answer | None:
         """Judge the quantity; None if a weight set has not been searched yet."""
@@ -47,23 +59,23 @@ class _OverRange:
             return None
         return self.judged(inside)
 
-    def judged(self, points: list[Point]) -> Answer:
-        """Judge the points of the range."""
-        raise NotImplementedError
-
 
 @dataclass(frozen=True)
-class Band(_OverRange):
+class Band(Rule):
     """Agrees if, at every velocity of a range, the interval of a quantity reaches into a band."""
 
     least: float = -np.inf
     most: float = np.inf
-    averaged: bool = False
-    """Judge the mean over the range, J_N of Eq. 10 with velocities on a grid, instead of each velocity."""
+    over: Literal["each", "mean", "changes"] = "each"
+    """Judge each velocity; the mean over the range, J_N of Eq. 10 with velocities on a grid; or the changes from each
+    velocity to the next, which rise (least = 0) or sink (most = 0)."""
 
     @property
     def words(self) -> str:
         """The rule in words."""
+        if self.over == "changes":
+            change = f"from each V to the next, over {self.span}, the 95 % interval of the change of"
+            return f"{change} {self.quantity.words} reaches {'above' if self.least == 0 else 'below'} 0"
         if self.least == self.most:
             band = f"reaches {self.least:g}"
         elif np.isinf(self.least):
@@ -72,21 +84,25 @@ class Band(_OverRange):
             band = f"does not lie below {self.least:g}"
         else:
             band = f"reaches into [{self.least:g}, {self.most:g}]"
-        at = f"averaged over {_range(self.velocities)}," if self.averaged else f"at {_range(self.velocities)}"
+        at = f"averaged over {self.span}," if self.over == "mean" else f"at {self.span}"
         return f"{at} the 95 % interval of {self.quantity.words} {band}"
 
     def judged(self, points: list[Point]) -> Answer:
-        if self.averaged:
+        """Judge the points, their mean or their changes."""
+        if self.over == "mean":
             of_each_start = np.mean([point.values for point in points], axis=0)
             points = [Point(points[0].velocity, f"mean to {points[-1].velocity:g}", of_each_start)]
-        estimates = [(point.estimate, _where(point)) for point in points]
-        strain = [max(value - self.most, self.least - value) for (value, _, _), _ in estimates]
-        agrees = all(low <= self.most and high >= self.least for (_, low, high), _ in estimates)
-        return _worst(estimates, strain, agrees)
+        estimates = [point.estimate for point in points]
+        if self.over == "changes":
+            names = dict.fromkeys(point.of for point in points)
+            series = ([point for point in points if point.of == name] for name in names)
+            estimates = [_change(*both) for one in series for both in pairwise(one)]
+        strain = [max(one.value - self.most, self.least - one.value) for one in estimates]
+        return _worst(estimates, strain, all(one.low <= self.most and one.high >= self.least for one in estimates))
 
 
 @dataclass(frozen=True)
-class Seen(_OverRange):
+class Seen(Rule):
     """Agrees if, at every velocity of a range, our count and that of the paper's own sample may have one frequency.
 
     Fisher's exact test, two-sided, at 5 %, holds for rare events and small samples too.
@@ -101,49 +117,19 @@ class Seen(_OverRange):
     def words(self) -> str:
         """The rule in words."""
         return (
-            f"at {_range(self.velocities)} Fisher's test does not tell the {self.quantity.words} from {self.count} of"
+            f"at {self.span} Fisher's test does not tell the {self.quantity.words} from {self.count} of"
             f" {self.of} starts, the paper's own sample (p >= {LEVEL:g})"
         )
 
     def judged(self, points: list[Point]) -> Answer:
+        """Judge the counts."""
         p = [fisher(int(one.values.sum()), len(one.values), self.count, self.of) for one in points]
-        estimates = [(point.estimate, _where(point)) for point in points]
-        strain = [
-            (one < LEVEL) + abs(value - self.count / self.of)
-            for one, ((value, _, _), _) in zip(p, estimates, strict=True)
-        ]
-        return _worst(estimates, strain, min(p) >= LEVEL)
+        estimates = [point.estimate for point in points]
+        off = [abs(one.value - self.count / self.of) for one in estimates]
+        return _worst(estimates, [(a < LEVEL) + b for a, b in zip(p, off, strict=True)], min(p) >= LEVEL)
 
 
-@dataclass(frozen=True)
-class Trend(_OverRange):
-    """Agrees if, from each velocity of a range to the next, the interval of the change reaches the right side of 0."""
-
-    sign: Literal[1, -1]
-
-    @property
-    def words(self) -> str:
-        """The rule in words."""
-        side = "above" if self.sign > 0 else "below"
-        return (
-            f"from each V to the next, over {_range(self.velocities)}, the 95 % interval of the change of"
-            f" {self.quantity.words} reaches {side} 0"
-        )
-
-    def judged(self, points: list[Point]) -> Answer:
-        """Judge the changes; the one that fits least is shown."""
-        steps = [
-            (_difference(one, following), f"{_where(one)} to {following.velocity:g}")
-            for name in dict.fromkeys(point.of for point in points)
-            for one, following in pairwise(point for point in points if point.of == name)
-        ]
-        agrees = all((high if self.sign > 0 else -low) >= 0 for (_, low, high), _ in steps)
-        return _worst(steps, [-self.sign * value for (value, _, _), _ in steps], agrees)
-
-
-Rule = Band | Seen | Trend
-
-RULES: dict[str, Any] = {"band": Band, "seen": Seen, "trend": Trend}
+RULES: dict[str, Any] = {"band": Band, "seen": Seen}
 """Classes by their kind in `claims.toml`."""
 
 
@@ -151,27 +137,16 @@ def fisher(count: int, size: int, other: int, of: int) -> float:
     """Return p of Fisher's exact test, two-sided, of `count` in `size` against `other` in `of`; 0 without starts."""
     from scipy.stats import fisher_exact
 
-    if size == 0 or of == 0:
-        return 0.0
-    return float(fisher_exact([[count, size - count], [other, of - other]]).pvalue)
+    return float(fisher_exact([[count, size - count], [other, of - other]]).pvalue) if size else 0.0
 
 
-def _worst(estimates: Sequence[tuple[Estimate, str]], strain: Sequence[float], agrees: bool) -> Answer:
-    """Return the answer at the first estimate, each with its place, that strains the rule most."""
-    (value, low, high), where = estimates[int(np.argmax(np.nan_to_num(strain, nan=np.inf)))]
-    return Answer(value, low, high, where, agrees)
+def _worst(estimates: Sequence[Estimate], strain: Sequence[float], agrees: bool) -> Answer:
+    """Return the answer at the first estimate that strains the rule most."""
+    return Answer(*estimates[int(np.argmax(np.nan_to_num(strain, nan=np.inf)))], agrees)
 
 
-def _difference(one: Point, other: Point) -> Estimate:
+def _change(one: Point, other: Point) -> Estimate:
     """Return the change of the mean and its 95 % interval, as of independent samples."""
-    (a, a_low, a_high), (b, b_low, b_high) = one.estimate, other.estimate
-    return b - a, b - a - float(np.hypot(b - b_low, a_high - a)), b - a + float(np.hypot(b_high - b, a - a_low))
-
-
-def _range(velocities: tuple[float, float]) -> str:
-    low, high = velocities
-    return f"V = {low:g}" if low == high else f"V in [{low:g}, {high:g}]"
-
-
-def _where(point: Point) -> str:
-    return f"V = {point.velocity:g}" + (f", {point.of}" if point.of else "")
+    (a, a_low, a_high, where), (b, b_low, b_high, _) = one.estimate, other.estimate
+    below, above = float(np.hypot(b - b_low, a_high - a)), float(np.hypot(b_high - b, a - a_low))
+    return Estimate(b - a, b - a - below, b - a + above, f"{where} to {other.velocity:g}")
