@@ -30,7 +30,7 @@ from hexmj.environments.task import (
 )
 from hexmj.environments.walkers import Acted, Alone, Walkers
 from hexmj.physics.engine import Diverged
-from hexmj.physics.substeps import FineSteps, Shown
+from hexmj.physics.substeps import Shown
 from hexmj.timing import Stride
 from hexmj.validate import whole
 
@@ -102,7 +102,7 @@ class InsectPhysics(mujoco.Physics):
         rows = self.data.ctrl[np.newaxis].repeat(nstep, axis=0) if self.rows is None else self.rows
         self.rows = None
         try:
-            self.shown = FineSteps.of(self.alone, nstep, self.compiled).take(ONLY, rows[np.newaxis])
+            self.shown = self.alone.take(ONLY, rows[np.newaxis])
         except Diverged as error:
             raise control.PhysicsError(f"the simulation diverged: {error.kinds}") from None
 
@@ -171,7 +171,7 @@ class Walking(control.Task):
     def get_reward(self, physics: InsectPhysics) -> float:
         """Return the reward, see `task`."""
         body = physics.alone
-        return 0.0 if self._acted.terminated else float(worth(body.qvel, body.rotation, self.task.command)[0])
+        return 0.0 if self._acted.terminated else worth(body.qvel[0], body.rotation[0], self.task.command)
 
     def get_termination(self, physics: InsectPhysics) -> float | None:
         """Return discount 0 on a fall, 1 at the end of time or ground, and None before."""

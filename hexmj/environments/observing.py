@@ -43,7 +43,7 @@ class Observer:
 
     def __init__(self, compiled: CompiledBody, task: Task) -> None:
         """Prepare the layout of the observations, which `task` describes."""
-        self._compiled, self._command = compiled, task.command
+        self._compiled, self._command, self._no_foot = compiled, task.command, compiled.body.lengths.no_foot_margin
         bounds = observation_bounds(compiled, task)
         self._low, self._high = (np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1))
         ends = np.cumsum([low.size for low, _ in bounds.values()]).tolist()
@@ -54,18 +54,18 @@ class Observer:
 
     def observe(self, places: Places, standing: np.ndarray, planned: Planned) -> np.ndarray:
         """Return all observations of some insects, (n, number); `standing` are feet that stand, (n, leg)."""
-        qpos, qvel, rotation, sensors = places
-        count, columns, lengths = len(standing), self._compiled.columns, self._compiled.body.lengths
-        feet = sensors[:, columns.foot].reshape(count, 6, 3)
-        margin, relative = np.empty(count), np.empty((count, 22))
-        margins(feet[:, :, :2] - sensors[:, np.newaxis, columns.centre_of_mass][:, :, :2], standing, margin)
-        measure(qpos, qvel, rotation, feet, *self._compiled.trunk_corners, relative)
+        (qpos, qvel, *_), count, columns = places, len(standing), self._compiled.columns
+        relative = np.empty((count, 24))
+        where = columns.foot.start, columns.centre_of_mass.start
+        measure(tuple(places), standing, *self._compiled.trunk_corners, where, relative)
+        relative[:, 22], relative[:, 23] = np.maximum(relative[:, 22], self._no_foot), self._command
         parts = (
             qpos[:, columns.qpos], qvel[:, columns.qvel], qpos[:, 3:ROOT_QPOS], relative[:, :3], qvel[:, 3:ROOT_QVEL],
-            relative[:, 3:], standing, np.maximum(margin, lengths.no_foot_margin)[:, np.newaxis],
-            np.full((count, 1), self._command), planned.stance, planned.tips.reshape(count, 18), planned.missed,
+            relative[:, 3:22], standing, relative[:, 22:], planned.stance, planned.tips.reshape(count, 18),
+            planned.missed,
         )  # fmt: skip
-        return np.concatenate(parts, axis=1)[:, : len(self._low)].clip(self._low, self._high)
+        flat = np.concatenate(parts, axis=1)[:, : len(self._low)]
+        return np.minimum(np.maximum(flat, self._low), self._high)
 
     def named(self, flat: np.ndarray) -> dict[str, np.ndarray]:
         """Return observations, (..., number), by name and in their shapes."""
@@ -77,18 +77,21 @@ class Observer:
 
 
 @jitted
-def measure(qpos: Any, qvel: Any, rotation: Any, feet: Any, corners: Any, radii: Any, relative: Any) -> None:
-    """Write velocity along the heading, clearance, and tips in the root frame into `relative`, (n, 3 + 1 + leg * axis).
+def measure(places: Any, standing: Any, corners: Any, radii: Any, columns: Any, relative: Any) -> None:
+    """Measure velocity along the heading, clearance, tips in the root frame, and stability margin.
 
     Args:
-        qpos, qvel, rotation: as in `Places`.
-        feet: in the world, (n, leg, axis) [mm].
+        places: `Places` of the insects.
+        standing: feet that stand, (n, leg).
         corners: of the trunk in the root frame, (corner, axis) [mm].
         radii: of the trunk at its corners, (corner,) [mm].
-        relative: filled.
+        columns: first sensor columns of feet and centre of mass.
+        relative: filled in this order, (n, 3 + 1 + leg * axis + 1 or more).
     """
+    (qpos, qvel, rotation, sensors), (foot, centre) = places, columns
+    around, margin = np.empty((1, 6, 2)), np.empty(1)
     for n in range(len(relative)):
-        seen, turn, v = relative[n], rotation[n], qvel[n]
+        seen, turn, v, s = relative[n], rotation[n], qvel[n], sensors[n]
         angle = np.arctan2(turn[1, 0], turn[0, 0])
         cosine, sine = np.cos(angle), np.sin(angle)
         seen[0], seen[1], seen[2] = cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2]
@@ -100,15 +103,33 @@ def measure(qpos: Any, qvel: Any, rotation: Any, feet: Any, corners: Any, radii:
             for k in range(3):
                 seen[4 + 3 * leg + k] = 0.0
                 for axis in range(3):
-                    seen[4 + 3 * leg + k] += (feet[n, leg, axis] - qpos[n, axis]) * turn[axis, k]
+                    seen[4 + 3 * leg + k] += (s[foot + 3 * leg + axis] - qpos[n, axis]) * turn[axis, k]
+            for axis in range(2):
+                around[0, leg, axis] = s[foot + 3 * leg + axis] - s[centre + axis]
+        margins(around, standing[n : n + 1], margin)
+        seen[22] = margin[0]
 
 
-def worth(qvel: np.ndarray, rotation: np.ndarray, command: float) -> np.ndarray:
-    """Return the reward of a step without a fall, max(0, 1 - |v - c| / c) max(0, u), of insects in their states now.
+@jitted
+def judge(ids: Any, sensors: Any, places: Any, trunk: Any, command: float, reward: Any, fell: Any) -> None:
+    """Compute rewards and falls of the insects that took a step.
 
     Args:
-        qvel: (n, velocity).
-        rotation: from the root frames to the world, (n, axis, axis).
+        ids: insects that took the step, (n,).
+        sensors: at the beginning of each substep, (n, substep, column).
+        places: `Places` of all insects after the step.
+        trunk: first column of the contacts of the trunk's parts, and the one after the last.
         command: commanded velocity [mm/s].
+        reward: filled for these insects, (insect,).
+        fell: filled for these insects, (insect,).
     """
-    return np.maximum(1.0 - np.abs(qvel[:, 0] - command) / command, 0.0) * np.maximum(rotation[:, 2, 2], 0.0)
+    _, qvel, rotation, now = places
+    for i, n in enumerate(ids):
+        fell[n] = (now[n, trunk[0] : trunk[1]] > 0).any() or (sensors[i, :, trunk[0] : trunk[1]] > 0).any()
+        reward[n] = 0.0 if fell[n] else worth(qvel[n], rotation[n], command)
+
+
+@jitted
+def worth(qvel: Any, rotation: Any, command: float) -> float:
+    """Return the reward of a step without a fall, max(0, 1 - |v - c| / c) max(0, u), of one insect in its state now."""
+    return max(1.0 - abs(qvel[0] - command) / command, 0.0) * max(rotation[2, 2], 0.0)

@@ -17,14 +17,14 @@ from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.bodies.kinematics import standing_tips
 from hexmj.controllers.planning import advanced, begin
 from hexmj.controllers.protocol import FeedbackPlan, Plan
-from hexmj.environments.observing import Observer, Places, Planned, worth
+from hexmj.environments.observing import Observer, Places, Planned, judge
 from hexmj.environments.task import Task, action_bounds
 from hexmj.errors import InputError
 from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, stepping, walk_error
 from hexmj.physics.foot_path import TipTargets, check_made_for, hold
 from hexmj.physics.rollout import Senses
 from hexmj.physics.settle import Settling
-from hexmj.physics.substeps import FineSteps, Shown
+from hexmj.physics.substeps import FineSteps, Shown, allowed_depth, strikes
 
 AHEAD = 128
 """Steps planned at once without sensory feedback."""
@@ -71,7 +71,6 @@ class Walkers:
         self._task, self._compiled, self._threads = task, compiled, threads
         self._settling = Settling(task.conditions, task.stride, threads)
         self._steps, self._substeps = task.steps, task.substeps
-        self._ends = task.conditions.ground in WITH_ENDS
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self.begun = False
@@ -89,7 +88,9 @@ class Walkers:
     def look(self, bodies: Bodies) -> None:
         """Refer to the arrays of these bodies, which change with each step."""
         self.bodies, self.places = bodies, Places(bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors)
-        self._fine = FineSteps.of(bodies, self._substeps, self._compiled)
+        self._take = (
+            bodies.take if isinstance(bodies, Alone) else FineSteps.of(bodies, self._substeps, self._compiled).take
+        )
 
     def begin(self, ids: np.ndarray, starts: np.ndarray) -> None:
         """Begin episodes of some insects, (n,), at starts, (n, leg) [mm]; the first call is for all insects.
@@ -132,7 +133,7 @@ class Walkers:
         actions = actions[self._ids]
         control = self.control(self._usual + actions * np.where(actions > 0, self._above, self._below))
         try:
-            return self.judge(self._fine.take(self._ids, control))
+            return self.judge(self._take(self._ids, control))
         except Diverged as error:
             time = float(self._done[error.start] * self._task.stride.dt)
             raise walk_error(error, "acting", time, self._task.conditions) from None
@@ -164,8 +165,9 @@ class Walkers:
         if self._task.actions == "tips":
             tips += wanted.reshape(-1, 1, 6, 3)
             joints, reachable = self._compiled.inverse(tips)
-            planned.missed[ids] = substeps - reachable.sum(axis=1)
+            planned.missed[ids] = 0.0
             if not reachable.all():
+                planned.missed[ids] = substeps - reachable.sum(axis=1)
                 hold(joints.swapaxes(0, 1), self._joints[ids])
             self._joints[ids] = joints[:, -1]
             control = joints.reshape(len(ids), substeps, -1)
@@ -180,17 +182,16 @@ class Walkers:
         """Return the result of a step, from its sensors and forces, (n, substep, ...)."""
         ids, acted, columns = self._ids, self._nothing(), self._compiled.columns
         self._senses.feel(ids, shown["sensors"], shown["force"])
-        now = self.places.sensors[ids]
-        fell = (shown["sensors"][:, :, columns.trunk] > 0).any(axis=(1, 2)) | (now[:, columns.trunk] > 0).any(axis=1)
+        trunk, places = (columns.trunk.start, columns.trunk.stop), tuple(self.places)
+        judge(ids, shown["sensors"], places, trunk, self._task.command, acted.reward, acted.terminated)
         self._done[ids] += 1
-        over = self._done[ids] == self._steps
-        if self._ends:
-            over |= beyond_the_ground(self._task.conditions, now[:, columns.foot].reshape(-1, 6, 3)).any(axis=1)
-        acted.terminated[ids], acted.truncated[ids] = fell, over & ~fell
-        reward = worth(self.places.qvel[ids], self.places.rotation[ids], self._task.command)
-        acted.reward[ids] = np.where(fell, 0.0, reward)
-        if (ended := fell | over).any():
-            self._leave(ids[ended])
+        acted.truncated[ids] = self._done[ids] == self._steps
+        if self._task.conditions.ground in WITH_ENDS:
+            feet = self.places.sensors[ids, columns.foot].reshape(-1, 6, 3)
+            acted.truncated[ids] |= beyond_the_ground(self._task.conditions, feet).any(axis=1)
+        acted.truncated[acted.terminated] = False
+        if (ended := acted.terminated | acted.truncated).any():
+            self._leave(np.flatnonzero(ended))
         self.begun = True
         return acted
 
@@ -236,6 +237,7 @@ class Alone:
     def __init__(self, compiled: CompiledBody, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Wrap a model and its data, which may be read and changed from outside."""
         self.model, self.data, self._foot = model, data, compiled.columns.foot
+        self._compiled, self._allowed = compiled, allowed_depth(compiled)
         self.qpos, self.qvel = data.qpos[np.newaxis], data.qvel[np.newaxis]
         self.rotation = data.xmat[compiled.root].reshape(1, 3, 3)
         self.sensors = data.sensordata[np.newaxis]
@@ -253,6 +255,14 @@ class Alone:
         mujoco.mj_setState(self.model, self.data, states[0], STATE_BITS)
         self._control[:] = control[0]
         mujoco.mj_step1(self.model, self.data)
+
+    def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
+        """Take one step of the plan; only if a foot strikes the ground, by `substeps.FineSteps.take`."""
+        rolled = self.roll(ids, control, 1)
+        if not strikes(self._compiled.depth(rolled.feet), control.shape[1], self._allowed).any():
+            return {"sensors": rolled.sensors, "force": rolled.force}
+        self.put(ids, rolled.before)
+        return FineSteps.of(self, control.shape[1], self._compiled).take(ids, control)
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """Take substeps, see `engine.Engine.roll`; neither torques nor states are stored."""

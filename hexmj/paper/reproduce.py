@@ -131,7 +131,7 @@ class Report:
             claim, beside = row.claim, {name: _plain(answers) for name, answers in row.beside.items()}
             paper = {"key": claim.key, "section": claim.section, "paper": claim.text, "value": claim.value}
             paper |= {"kind": claim.kind, "calibrates": list(claim.calibrates)}
-            how = {"rule": claim.rule.words, "fits": row.fits, "why": row.why, "command": self.command(row)}
+            how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": self.command(row)}
             rows.append(paper | {"ours": _plain(row.answers), "beside": beside} | how)
         return {"claims": rows, "summary": self.summary, "protocol": asdict(self.protocol)}
 
