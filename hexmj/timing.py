@@ -46,14 +46,13 @@ class Stride:
     """Lines of the tips: fig1, as in Fig. 1 (`FIG1`), or centred (`CENTRED`), with the centre of mass above O_2."""
 
     def __post_init__(self) -> None:
-        for name in ("aep0", "pep0", "pep_min", "dt"):
+        for name in ("aep0", "pep0", "pep_min"):
             object.__setattr__(self, name, number(name, getattr(self, name), -FAR, FAR))
+        object.__setattr__(self, "dt", number("dt", self.dt, LEAST_STEP, 1))
         if not self.pep_min <= self.pep0 < self.aep0:
             raise InputError(
                 f"pep_min = {self.pep_min}, pep0 = {self.pep0}, aep0 = {self.aep0} mm; expected pep_min <= pep0 < aep0"
             )
-        if not LEAST_STEP <= self.dt <= 1:
-            raise InputError(f"dt = {self.dt}; expected a time step of at least {LEAST_STEP:g} and at most 1 time unit")
 
     def periods(self, velocity: Any, count: float = 1.0) -> Any:
         """Duration of some periods of a single leg at V_r, (AEP_0 - PEP_0) (1 + 1/V) each [time units]."""
@@ -83,9 +82,9 @@ class Acceleration:
 def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Acceleration | None) -> None:
     """Raise InputError if V_r, (...) fractions of V_p, and the growth of V in a time step (Eq. 11) reach 1 together."""
     if acceleration and not (velocity + acceleration.rate * stride.dt < 1.0).all():
+        step = acceleration.rate * stride.dt
         raise InputError(
-            f"V = {velocity.max():g} is reached in steps of {acceleration.rate * stride.dt:g};"
-            " expected V and a step together below 1"
+            f"V = {velocity.max():g} is reached in steps of {step:g}; expected V and a step below 1 together"
         )
 
 
@@ -93,10 +92,8 @@ def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acce
     """Raise InputError if V_r, (velocity,), is not reached by Eq. 11 within a time, (velocity,) [time units]."""
     if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity) * (1.0 - 1e-9))).size:
         v, end = velocity[late[0]], duration[late[0]]
-        raise InputError(
-            f"V = {v:g} is reached at {acceleration.duration(v):g} time units; expected an observation time longer than"
-            f" {end:g}, or 'walk' or 'start', which begin when V is reached"
-        )
+        reached = f"V = {v:g} is reached at {acceleration.duration(v):g} time units"
+        raise InputError(f"{reached}; expected an observation time longer than {end:g}, or 'walk' or 'start'")
 
 
 def observation_duration(

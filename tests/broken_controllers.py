@@ -13,6 +13,7 @@ from hexmj.controllers.baselines.lifted import LiftedPlan
 from hexmj.controllers.baselines.metronomes import Metronome
 from hexmj.controllers.baselines.righetti import Righetti
 from hexmj.legs import CENTRED
+from hexmj.timing import AT_SPEED
 from hexmj.walks import PlannedWalk
 from stepwise_ldvs import Change, Own
 
@@ -237,8 +238,10 @@ class NeverSlow(Metronome):
 
 def steered(rule: type = Metronome, **changed: Any) -> Any:
     """Return a baseline whose plans do something else when they are steered."""
-    plan = type("SteeredPlan", (LiftedPlan,), changed)
-    return type("Steered", (rule,), {"_plan": lambda rule, *arguments: plan(rule, *arguments)})()
+    plan: Any = type("SteeredPlan", (LiftedPlan,), changed)
+    ages = {"begin": 0, "begin_at_speed": AT_SPEED}
+    begins = {name: lambda rule, *given, age=age: plan(rule, *given[:4], age) for name, age in ages.items()}
+    return type("Steered", (rule,), begins)()
 
 
 BROKEN: list[tuple[str, Any]] = [

@@ -1,6 +1,5 @@
 """The common part of all baselines: the interface, the legs, and their names."""
 
-from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -64,7 +63,6 @@ def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_on
     ("name", "make"),
     [
         ("theta", lambda: Evolved(theta=float("nan"))),
-        ("tau", lambda: Evolved(tau=2000.0)),
         ("wave", lambda: Metronome(cast(Any, "gallop"))),
         ("rules", lambda: Walknet(rules=(1, 4))),
     ],
@@ -72,25 +70,3 @@ def test_metronomes_walk_their_gait_from_any_start_and_at_once_from_the_ideal_on
 def test_invalid_constants_are_refused(name: str, make: Any) -> None:
     with pytest.raises(InputError, match=name):
         make()
-
-
-def test_a_rule_may_change_its_arguments() -> None:
-    def lifts(spoils: bool):
-        def decided(self, state, legs):
-            far = legs.x < -8.0 * legs.v
-            if spoils:
-                legs.x[:], legs.stands[:], legs.v[:] = np.nan, False, 2.0
-            return state, far
-
-        return decided
-
-    starts, walks = hexmj.draw_starts(4, 0), []
-    for spoils in (False, True):
-        own = {"name": "rule", "at_start": lambda self, legs: legs.x, "lifts": lifts(spoils)}
-        rule: Any = dataclass(frozen=True)(type("Rule", (Lifted,), own))()
-        plan = rule.begin(starts, np.full(4, 0.5), Stride())
-        plan._state[:] = 1.0
-        assert np.array_equal(plan.starts, starts)
-        walks.append(plan.advance(200))
-    for name in PLANNED:
-        assert np.array_equal(getattr(walks[0], name), getattr(walks[1], name), equal_nan=True)

@@ -186,10 +186,10 @@ def filmed(path: Path, recordings: "Sequence[xr.Dataset]", *film: Any) -> list[P
 
 def searched(given: SimpleNamespace) -> dict[str, list[int]]:
     """Return the controllers that a search found on the starts of --seed, with the seeds of their searches."""
-    from hexmj.controllers.registry import load_controller, searched_on
+    from hexmj.controllers.registry import searched_on
 
     names: Iterable[str] = [given.controller] if isinstance(given.controller, str) else given.controller
-    found = {what: seeds for name in names for what, seeds in searched_on(name, load_controller(name)).items()}
+    found = {what: seeds for name in names for what, seeds in searched_on(name).items()}
     return {what: seeds for what, seeds in found.items() if given.seed in seeds}
 
 

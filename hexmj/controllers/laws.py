@@ -3,14 +3,13 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from hexmj.controllers.planning import (
     advanced,
     begin,
-    begin_at_speed,
     check_same,
     check_velocities,
     place,
@@ -71,9 +70,7 @@ class Trial:
     def begin(self, threads: int | None = 1) -> Plan:
         """Return a new plan."""
         arguments = self.starts, self.velocity, self.stride, self.acceleration, threads
-        if self.at_speed:
-            return begin_at_speed(cast(SteerableController, self.controller), *arguments)
-        return begin(self.controller, *arguments)
+        return begin(self.controller, *arguments, self.at_speed)
 
     @cached_property
     def walk(self) -> PlannedWalk:

@@ -6,13 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.controllers.protocol import (
-    Controller,
-    Plan,
-    SteerableController,
-    SteerablePlan,
-    check_controller_type,
-)
+from hexmj.controllers.protocol import Controller, Plan, SteerablePlan, check_controller_type, check_steerable
 from hexmj.errors import InputError, Refused
 from hexmj.legs import LEGS
 from hexmj.stability import walk_margin
@@ -42,39 +36,32 @@ def begin(
     stride: Stride,
     acceleration: Acceleration | None = None,
     threads: int | None = None,
+    at_speed: bool = False,
 ) -> Plan:
     """Return a controller's plan for starts, (start, leg) [mm], and V_r, one number or (start,).
+
+    `at_speed` it is a `SteerablePlan` that walks at its final velocity from time 0.
 
     Raises:
         InputError: a start, velocity or plan is out of range; `Refused` if the controller refuses.
     """
     check_controller_type(controller)
+    if at_speed:
+        check_steerable(controller)
     thread_count(threads)
     x = checked_starts(starts, stride)
     v = checked_velocities(velocity, len(x), acceleration)
     check_reached(v, stride, acceleration)
     try:
-        plan = controller.begin(x.copy(), v, stride, acceleration, threads)
+        begun: Any = getattr(controller, "begin_at_speed" if at_speed else "begin")
+        plan = begun(x.copy(), v, stride, acceleration, threads)
     except InputError as error:
         if type(error) is not InputError:
             raise
         raise Refused(*error.args) from error
     check_plan(plan, x, stride)
-    return plan
-
-
-def begin_at_speed(
-    controller: SteerableController, starts: np.ndarray, velocity: np.ndarray, stride: Stride, *others: Any
-) -> SteerablePlan:
-    """Return a plan that walks at its final velocity from time 0; `others` are acceleration and threads.
-
-    Raises:
-        InputError: the plan cannot be steered, or does not fit its arguments.
-    """
-    plan = controller.begin_at_speed(starts.copy(), velocity.copy(), stride, *others)
-    if not isinstance(plan, SteerablePlan):
+    if at_speed and not isinstance(plan, SteerablePlan):
         raise InputError(f"begin_at_speed of {controller.name} returned {short(plan)}; expected a steerable plan")
-    check_plan(plan, starts, stride)
     return plan
 
 

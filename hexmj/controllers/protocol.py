@@ -26,20 +26,12 @@ class Plan(Protocol):
     way to the result of `planning.planned_losses`.
     """
 
-    @property
-    def starts(self) -> np.ndarray:
-        """(start, leg) tips at time 0 on their own axes, all standing [mm]."""
-        ...
-
-    @property
-    def stride(self) -> Stride:
-        """Time step and lines of the tips."""
-        ...
-
-    @property
-    def done(self) -> int:
-        """Number of steps planned so far."""
-        ...
+    starts: np.ndarray
+    """(start, leg) tips at time 0 on their own axes, all standing [mm]."""
+    stride: Stride
+    """Time step and lines of the tips."""
+    done: int
+    """Number of steps planned so far."""
 
     def advance(self, steps: int) -> PlannedWalk:
         """Return the next `steps` steps of all starts; the walk does not depend on how steps are divided into calls."""

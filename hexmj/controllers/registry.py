@@ -15,11 +15,10 @@ import numpy as np
 
 from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.baselines.evolved import EVOLVED, FOUND
-from hexmj.controllers.cruse1998 import OWN_TABLES, PRESETS, Cruse1998, read_network
+from hexmj.controllers.cruse1998 import OWN_TABLES, PRESETS, read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.files import SEARCHED, read_toml
-from hexmj.plain import plain
 from hexmj.validate import short
 
 ENTRY_POINTS = "hexmj.controllers"
@@ -77,26 +76,21 @@ def parameter_file(name: str) -> Path | None:
     return Path(name) if name.endswith(".toml") and Path(name).is_file() else None
 
 
-def searched_on(name: str, controller: Controller) -> dict[str, list[int]]:
+def searched_on(name: str) -> dict[str, list[int]]:
     """Return on which starts searches found a controller: there it looks better than it is.
 
     Args:
-        name: as `load_controller` takes it.
-        controller: as `load_controller` returns it.
+        name: as `load_controller` takes it, perhaps without some mechanisms.
 
     Returns:
-        Name of the search's result -> seeds of the starts of its search, and of those that it continued. Our own weight
-        sets are recognised under any name, and without some of their mechanisms.
+        Name of the search's result -> seeds of the starts of its search, and of those that it continued.
     """
     varied = VARIED.fullmatch(name)
     base = varied["name"] if varied else name
-    weights = plain(controller.weights) if isinstance(controller, Cruse1998) else None
-    tables = {own: table for own, table in OWN_TABLES.items() if base == own or weights == plain(PRESETS[own].weights)}
-    if base == EVOLVED.name or controller == EVOLVED:
-        tables[EVOLVED.name] = read_toml(FOUND)
+    tables = {**OWN_TABLES, EVOLVED.name: read_toml(FOUND)}
     if file := parameter_file(base):
         tables[base] = read_toml(file)
-    return {found: table[SEARCHED]["seeds"] for found, table in tables.items() if SEARCHED in table}
+    return {base: tables[base][SEARCHED]["seeds"]} if SEARCHED in tables.get(base, {}) else {}
 
 
 def _object(where: str, what: str, name: str) -> Controller:

@@ -136,11 +136,10 @@ def title(problem: Problem, effort: Effort) -> str:
 
 def _earlier_seeds(problem: Problem, effort: Effort) -> set[int]:
     """Return the seeds of the searches that found what this search begins with."""
-    form, beginning = problem.form, effort.beginning
-    begins = [(form.name, form.usual)] if isinstance(form, FieldsForm) else []
-    if beginning is not None:
-        begins.append((effort.begin if isinstance(effort.begin, str) else beginning.name, beginning))
-    return {seed for begin in begins for seeds in searched_on(*begin).values() for seed in seeds}
+    begins = [problem.form.name] if isinstance(problem.form, FieldsForm) else []
+    if effort.beginning is not None:
+        begins.append(effort.begin if isinstance(effort.begin, str) else effort.beginning.name)
+    return {seed for begin in begins for seeds in searched_on(begin).values() for seed in seeds}
 
 
 def _compared(problem: Problem) -> tuple[Mapping[str, Controller], dict[str, np.ndarray]]:

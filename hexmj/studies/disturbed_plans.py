@@ -5,18 +5,17 @@ alone do not keep a walk stable.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
-from hexmj.controllers.planning import begin, begin_at_speed
+from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import (
     Controller,
     FeedbackPlan,
     Sensed,
     SteerableController,
     SteerablePlan,
-    check_steerable,
 )
 from hexmj.controllers.wrappers import WrappedPlan
 from hexmj.errors import InputError
@@ -176,10 +175,10 @@ class Disturbed:
         Raises:
             InputError: the controller's plans cannot be steered, or the disturbance is that of other starts.
         """
-        check_steerable(self.controller)
         if (count := len(self.disturbance.step)) != len(starts):
             raise InputError(f"a disturbance of {count} starts; expected one of {len(starts)}")
-        plan = begin_at_speed(self.controller, starts, velocity, stride, acceleration, threads)
+        arguments = self.controller, starts, velocity, stride, acceleration, threads
+        plan = cast(SteerablePlan, begin(*arguments, at_speed=True))
         return DisturbedFeedbackPlan(self, plan) if isinstance(plan, FeedbackPlan) else DisturbedPlan(self, plan)
 
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from hexmj.body import ROOT_QPOS
 from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.planning import begin, begin_at_speed
+from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, SteerableController, SteerablePlan
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import Orders, OrdersFromPlan, steps_in_chunk
@@ -94,7 +95,7 @@ class SteeredPlan:
         """
         if not (isinstance(controller, SteerableController) and isinstance(self._plan, SteerablePlan)):
             return False
-        plan = begin_at_speed(controller, self.starts, np.array([velocity]), self.stride)
+        plan = cast(SteerablePlan, begin(controller, self.starts, velocity, self.stride, at_speed=True))
         plan.see(self._plan.tips.copy(), self._plan.standing.copy())
         self._plan = plan
         return True

@@ -24,7 +24,6 @@ import numpy as np
 from hexmj.controllers.baselines.lifted import Legs, Lifted, from_neighbour
 from hexmj.files import read_toml
 from hexmj.legs import MIRROR, N2, N4
-from hexmj.validate import number
 
 FOUND = Path(__file__).with_name("evolved.toml")
 """The constants that the search found, as it wrote them."""
@@ -34,9 +33,6 @@ GAIN = 8.0
 
 TAU = 2.0
 """Unit of the time constant [time units]; a swing from PEP_0 to AEP_0 takes 20."""
-
-LONGEST = 1000
-"""Greatest log2 of the time constant, near the limit of double precision."""
 
 
 @dataclass(frozen=True)
@@ -61,19 +57,16 @@ class Evolved(Lifted):
     """Weight of the output of the contralateral leg."""
     name: str = "evolved"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        number("tau", self.tau, -LONGEST, LONGEST)
-
     mirrored = True
 
     def at_start(self, legs: Legs) -> np.ndarray:
-        """See `LiftingRule`: all potentials, (start, leg), are 0."""
+        """See `Lifted`: all potentials, (start, leg), are 0."""
         return np.zeros_like(legs.x)
 
     def lifts(self, state: np.ndarray, legs: Legs) -> tuple[np.ndarray, np.ndarray]:
-        """See `LiftingRule`: the equation, solved exactly for outputs and inputs that are constant over the step."""
-        with np.errstate(over="ignore"):  # there the output is 0
+        """See `Lifted`: the equation, solved exactly for outputs and inputs that are constant over the step."""
+        with np.errstate(over="ignore", divide="ignore"):  # there an exponential is 0 or 1
+            decay = np.exp(-legs.stride.dt / (TAU * np.float64(2.0) ** self.tau))
             sent = 1.0 / (1.0 + np.exp(-GAIN * (state + self.theta)))
         drive = (
             self.own * sent
@@ -83,7 +76,7 @@ class Evolved(Lifted):
             + self.position * legs.travel
             + self.velocity * legs.v
         )
-        y = drive + (state - drive) * np.exp(-legs.stride.dt / (TAU * 2.0**self.tau))
+        y = drive + (state - drive) * decay
         return y, (state <= -self.theta) & (y > -self.theta)
 
 

@@ -6,14 +6,14 @@ so, and at PEP_min at the latest, beyond which no leg reaches. So V, V_p, AEP_0 
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from hexmj.controllers.protocol import Sensed
 from hexmj.controllers.stepwise import Step, StepwisePlan
 from hexmj.starts import checked_starts, checked_velocities
-from hexmj.timing import AT_SPEED, Acceleration, Stride, commanded_velocities
+from hexmj.timing import AT_SPEED, Stride, commanded_velocities
 from hexmj.validate import choice, number
 
 MOST = 1.7e308
@@ -41,50 +41,23 @@ class Legs:
         """(start, leg) distance of the tips behind AEP_0, as a fraction of AEP_0 - PEP_0: 1 at PEP_0."""
         return (self.stride.aep0 - self.x) / (self.stride.aep0 - self.stride.pep0)
 
-    def copied(self) -> "Legs":
-        """Return a copy that a rule may change."""
-        return replace(self, x=self.x.copy(), stands=self.stands.copy(), v=self.v.copy())
-
     @property
     def stance_part(self) -> np.ndarray:
         """(start, 1) fraction of the period (AEP_0 - PEP_0) (1 + 1/V) for which a leg stands: 1 / (1 + V)."""
         return 1.0 / (1.0 + self.v)
 
 
-class LiftingRule(Protocol):
-    """A controller that only decides which legs are lifted. Both methods treat every start independently."""
-
-    reads_load: bool
-    """See `Lifted`."""
-
-    def at_start(self, legs: Legs) -> Any:
-        """Return the state at time 0, when all legs stand: an array whose first axis is the start, or a named tuple."""
-        ...
-
-    def lifts(self, state: Any, legs: Legs) -> tuple[Any, np.ndarray]:
-        """Return the state after the step that moved the legs, and which legs are lifted now, (start, leg) of bool."""
-        ...
-
-
 class LiftedPlan(StepwisePlan):
     """A `protocol.SteerablePlan` whose legs a rule lifts; a `protocol.FeedbackPlan` if the rule reads the load."""
 
-    def __init__(
-        self,
-        rule: LiftingRule,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None,
-        age: int = 0,
-    ) -> None:
-        """Begin at time 0; an acceleration began `age` steps earlier."""
+    def __init__(self, rule: "Lifted", starts, velocity, stride, acceleration, age=0) -> None:
+        """Begin at time 0, see `protocol.Controller.begin`; an acceleration began `age` steps earlier."""
         x = checked_starts(starts, stride)
         v = checked_velocities(velocity, len(x), acceleration)
         super().__init__(self._step, x, v, stride, acceleration, np.full(len(x), age))
         self._rule, self._felt = rule, np.full(x.shape, np.nan)
         self._legs = self._at_rest(x)
-        self._state: Any = rule.at_start(self._legs.copied())
+        self._state: Any = rule.at_start(self._legs)
         if rule.reads_load:
             self.sense = self._feel
 
@@ -106,7 +79,7 @@ class LiftedPlan(StepwisePlan):
         """See `protocol.SteerablePlan`."""
         self.slow_down(which)
         rest = self._at_rest(tips)
-        self._state = _chosen(which, self._rule.at_start(rest.copied()), self._state)
+        self._state = _chosen(which, self._rule.at_start(rest), self._state)
         self.see(_chosen(which, tips, self.tips), _chosen(which, rest.stands, self.standing))
 
     def slow_down(self, which: np.ndarray) -> None:
@@ -125,7 +98,7 @@ class LiftedPlan(StepwisePlan):
         stands = legs.stands | (x > self.stride.aep0 - dt / 2)
         load = np.where(np.isnan(self._felt), _equal_parts(stands), self._felt)
         moved = Legs(x, stands, load, v, self.stride)
-        self._state, lifted = self._rule.lifts(self._state, moved.copied())
+        self._state, lifted = self._rule.lifts(self._state, moved)
         self._legs = replace(moved, stands=stands & ~(lifted | (x - v * dt < self.stride.pep_min)))
         return Step(self._legs.x, self._legs.stands)
 
@@ -137,7 +110,10 @@ class LiftedPlan(StepwisePlan):
 
 
 class Lifted:
-    """Base class that makes a `LiftingRule` a `protocol.SteerableController`, and validates its fields."""
+    """Base class of controllers that only decide which legs are lifted; makes them a `protocol.SteerableController`.
+
+    A rule treats every start independently and changes none of its arguments.
+    """
 
     reads_load = False
     """Whether the rule uses the load; nothing else is sensed."""
@@ -150,16 +126,21 @@ class Lifted:
             elif get_origin(kind) is Literal:
                 choice(name, getattr(self, name), get_args(kind))
 
+    def at_start(self, legs: Legs) -> Any:
+        """Return the state at time 0, when all legs stand: an array whose first axis is the start, or a named tuple."""
+        raise NotImplementedError
+
+    def lifts(self, state: Any, legs: Legs) -> tuple[Any, np.ndarray]:
+        """Return the state after the step that moved the legs, and which legs are lifted now, (start, leg) of bool."""
+        raise NotImplementedError
+
     def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> LiftedPlan:
         """See `protocol.Controller.begin`."""
-        return self._plan(starts, velocity, stride, acceleration)
+        return LiftedPlan(self, starts, velocity, stride, acceleration)
 
     def begin_at_speed(self, starts, velocity, stride, acceleration=None, threads=None) -> LiftedPlan:
         """See `protocol.SteerableController.begin_at_speed`."""
-        return self._plan(starts, velocity, stride, acceleration, AT_SPEED)
-
-    def _plan(self, *arguments: Any) -> LiftedPlan:
-        return LiftedPlan(self, *arguments)  # pyright: ignore[reportArgumentType]
+        return LiftedPlan(self, starts, velocity, stride, acceleration, AT_SPEED)
 
 
 def from_neighbour(table: tuple[tuple[int, ...], ...], values: np.ndarray) -> np.ndarray:

@@ -42,13 +42,13 @@ class Metronome(Lifted):
     name: str = "wilson"
 
     def at_start(self, legs: Legs) -> Clock:
-        """See `LiftingRule`."""
+        """See `Lifted`."""
         phase = -self._lag(legs.v)
         swings = phase % 1.0 < _swing_part(legs.v)
         return Clock(np.zeros_like(legs.v), np.floor(phase) - swings)
 
     def lifts(self, state: Clock, legs: Legs) -> tuple[Clock, np.ndarray]:
-        """See `LiftingRule`."""
+        """See `Lifted`."""
         span = legs.stride.aep0 - legs.stride.pep0
         time = state.time + legs.stride.dt / span * _swing_part(legs.v)
         swings = np.floor(time - self._lag(legs.v))

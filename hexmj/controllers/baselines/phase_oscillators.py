@@ -59,23 +59,20 @@ class PhaseOscillators(Lifted):
         return self.gait == "tripod"
 
     def at_start(self, legs: Legs) -> Oscillators:
-        """See `LiftingRule`."""
+        """See `Lifted`."""
         swing = 1.0 - legs.stance_part
         phase = swing + legs.stance_part * np.clip(legs.travel, 0.0, 1.0)
         return Oscillators(phase, np.full_like(legs.v, self.amplitude_at_start))
 
     def lifts(self, state: Oscillators, legs: Legs) -> tuple[Oscillators, np.ndarray]:
-        """See `LiftingRule`."""
+        """See `Lifted`."""
         span = legs.stride.aep0 - legs.stride.pep0
         periods = legs.stride.dt / span * (1.0 - legs.stance_part)  # nu dt
         phase, r = state
-        pull = r * self.coupling / NU * self._pulls(phase) / (2.0 * np.pi)
+        bias = BIASES[self.gait]
+        ahead = phase[:, None, :] - phase[:, :, None] - bias  # (start, leg i, leg j)
+        pulls = sum_of_legs(np.where(bias > 0, np.sin(2.0 * np.pi * ahead), 0.0))  # the sum of Eq. 1
+        pull = r * self.coupling / NU * pulls / (2.0 * np.pi)
         after = phase + periods * (1.0 + pull)  # Eq. 1, Euler as in the source
         r = r + periods * self.convergence / NU * (self.amplitude - r)  # Eq. 2
         return Oscillators(after, r), np.ceil(after) > np.ceil(phase)
-
-    def _pulls(self, phase: np.ndarray) -> np.ndarray:
-        """Return the sum of the sines of Eq. 1, (start, leg)."""
-        bias = BIASES[self.gait]
-        ahead = phase[:, None, :] - phase[:, :, None] - bias  # (start, leg i, leg j)
-        return sum_of_legs(np.where(bias > 0, np.sin(2.0 * np.pi * ahead), 0.0))

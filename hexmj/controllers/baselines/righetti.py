@@ -82,12 +82,12 @@ class Righetti(Lifted):
         self.begin(starts, np.full(N_TRIED, velocity), stride).advance(TRIED)
 
     def at_start(self, legs: Legs) -> Hopf:
-        """See `LiftingRule`."""
+        """See `Lifted`."""
         angle = np.pi * np.clip(legs.travel, 0.0, 1.0)
         return Hopf(np.cos(angle), np.sin(angle))
 
     def lifts(self, state: Hopf, legs: Legs) -> tuple[Hopf, np.ndarray]:
-        """See `LiftingRule`.
+        """See `Lifted`.
 
         Raises:
             Refused: the oscillators diverge at this time step.

@@ -41,11 +41,11 @@ class Scores(Lifted):
     name: str = "flygym-rules"
 
     def at_start(self, legs: Legs) -> tuple[()]:
-        """See `LiftingRule`: no state, since the states of the legs suffice."""
+        """See `Lifted`: no state, since the states of the legs suffice."""
         return ()
 
     def lifts(self, state: tuple[()], legs: Legs) -> tuple[tuple[()], np.ndarray]:
-        """See `LiftingRule`."""
+        """See `Lifted`."""
         scores, waits = self.scores(legs), legs.stands & (legs.travel >= 1.0)
         highest = scores.max(axis=1, keepdims=True)  # also of legs that do not wait, as in the source
         eligible = waits & (scores > 0) & (scores >= highest - self.margin * np.abs(highest))

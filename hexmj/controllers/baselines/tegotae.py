@@ -24,6 +24,9 @@ import numpy as np
 from hexmj.controllers.baselines.lifted import Legs, Lifted, from_neighbour
 from hexmj.legs import MIRROR, N2, N4
 
+NEIGHBOURS = np.array(2 * [2.0, 3.0, 2.0])
+"""Number of legs in front, behind and across, (leg,)."""
+
 
 @dataclass(frozen=True)
 class Tegotae(Lifted):
@@ -39,20 +42,15 @@ class Tegotae(Lifted):
     mirrored = True
 
     def at_start(self, legs: Legs) -> np.ndarray:
-        """See `LiftingRule`: phi / 2 pi, (start, leg) [periods]; a swing begins at each whole number."""
+        """See `Lifted`: phi / 2 pi, (start, leg) [periods]; a swing begins at each whole number."""
         return 0.5 + 0.5 * np.clip(legs.travel, 0.0, 1.0)
 
     def lifts(self, state: np.ndarray, legs: Legs) -> tuple[np.ndarray, np.ndarray]:
-        """See `LiftingRule`."""
+        """See `Lifted`."""
         span = legs.stride.aep0 - legs.stride.pep0
         omega = 0.5 * legs.stride.dt / span * np.where(legs.stands, legs.v, 1.0)  # omega dt [periods]
         load = 6.0 * legs.load
-        feedback = self.neighbours * _mean_of_neighbours(load) - self.own * load
+        received = from_neighbour(N2, load) + from_neighbour(N4, load) + load[:, MIRROR]
+        feedback = self.neighbours * (received / NEIGHBOURS) - self.own * load
         after = state + omega * np.maximum(1.0 + feedback * np.cos(2.0 * np.pi * state), 0.0)  # Eq. 1
         return after, np.ceil(after) > np.ceil(state)
-
-
-def _mean_of_neighbours(load: np.ndarray) -> np.ndarray:
-    """Return the mean over the legs in front, behind and across, (start, leg)."""
-    total = from_neighbour(N2, load) + from_neighbour(N4, load) + load[:, MIRROR]
-    return total / np.array(2 * [2.0, 3.0, 2.0])

@@ -22,12 +22,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexmj.controllers.baselines.lifted import Legs, Lifted
+from hexmj.controllers.baselines.lifted import Legs, Lifted, from_neighbour
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2, N4
-
-BEHIND, AHEAD = ([near[0] if near else leg for leg, near in enumerate(table)] for table in (N2, N4))
-"""Index of the ipsilateral neighbours, (leg,); of itself where there is none."""
 
 OfPairs = tuple[float, float, float]
 """Values for front, middle and hind legs, left and right alike."""
@@ -47,7 +44,7 @@ class Links:
     def shift(self, sent: np.ndarray) -> np.ndarray:
         """Return each leg's shift, (start, leg) [step lengths], by `sent`, (start, leg), at most 1."""
         behind, ahead, across = (np.array(2 * values) for values in (self.behind, self.ahead, self.across))
-        return sent[:, BEHIND] * behind + sent[:, AHEAD] * ahead + sent[:, MIRROR] * across
+        return from_neighbour(N2, sent) * behind + from_neighbour(N4, sent) * ahead + sent[:, MIRROR] * across
 
 
 @dataclass(frozen=True)
@@ -208,11 +205,11 @@ class Walknet(Lifted):
         return replace(self, name=f"{self.name}-without-{rule}", rules=tuple(r for r in self.rules if r != rule))
 
     def at_start(self, legs: Legs) -> np.ndarray:
-        """See `LiftingRule`: times since touchdown, (start, leg) [time units]; infinite where there was none."""
+        """See `Lifted`: times since touchdown, (start, leg) [time units]; infinite where there was none."""
         return np.full(legs.x.shape, np.inf)
 
     def lifts(self, state: np.ndarray, legs: Legs) -> tuple[np.ndarray, np.ndarray]:
-        """See `LiftingRule`."""
+        """See `Lifted`."""
         dt, span = legs.stride.dt, legs.stride.aep0 - legs.stride.pep0
         age = np.where(legs.stands, state + dt, -dt)  # 0 at the step of touchdown
         shift = sum((self.shift(rule, legs, age) for rule in self.rules), np.zeros(legs.x.shape))

@@ -148,13 +148,6 @@ class Cruse1998:
         plan = self.begin(starts, velocity, stride, acceleration, threads)
         return replace(plan, first=plan.final)
 
-    @property
-    def _rules(self) -> Rules:
-        """Rules, as the kernel reads them."""
-        chosen: list[tuple[Any, str]] = [(Order, self.order)]
-        chosen += [(hint, getattr(self.model_variant, name)) for name, hint in get_type_hints(ModelVariant).items()]
-        return tuple((0,) * get_args(names).index(value) for names, value in chosen)
-
     def _constants(self, stride: Stride, acceleration: Acceleration | None) -> Constants:
         """Return weights, constants and rules, as the kernel reads them."""
         w, d, g = general(self.weights), np.arange(6), stride.geometry
@@ -164,7 +157,10 @@ class Cruse1998:
         p = np.concatenate([matrix[d, source] for matrix, source in table])
         eq11 = (acceleration.start, acceleration.rate) if acceleration else (0.0, 0.0)
         k = np.array([stride.aep0, stride.pep0, stride.pep_min, stride.dt, *eq11, *g.origin, *(1 / np.abs(g.y))])
-        return tuple(p.tolist()), tuple(k.tolist()), self._rules
+        chosen: list[tuple[Any, str]] = [(Order, self.order)]
+        chosen += [(hint, getattr(self.model_variant, name)) for name, hint in get_type_hints(ModelVariant).items()]
+        rules = tuple((0,) * get_args(names).index(value) for names, value in chosen)
+        return tuple(p.tolist()), tuple(k.tolist()), rules
 
 
 @dataclass(eq=False)

@@ -58,11 +58,9 @@ class Weights:
             matrix = numbers(kind, getattr(self, kind))
             if matrix.shape != (6, 6) or not np.isfinite(matrix).all():
                 raise InputError(f"{kind} has the shape {matrix.shape}; expected 6 x 6 finite weights")
-            allowed = np.zeros((6, 6), dtype=bool)
-            allowed[tuple(np.transpose([pair for of, pair in PLACES.values() if of == kind]))] = True
-            if (stray := np.argwhere((matrix != 0) & ~allowed)).size:
-                d, e = (LEGS[leg] for leg in stray[0])
-                raise InputError(f"{kind} of leg {d} from leg {e} is not 0; expected 0, since they are no neighbours")
+            for d, e in np.argwhere(matrix):
+                if e not in NEIGHBOURS[kind][d]:
+                    raise InputError(f"{kind} of leg {LEGS[d]} from leg {LEGS[e]} is not 0, but they are no neighbours")
             if kind in BINARY and not np.isin(matrix, (0.0, 1.0)).all():
                 raise InputError(f"{kind} is binary in the paper; expected only 0 or 1")
             matrix.setflags(write=False)
