@@ -1,6 +1,6 @@
 """First losses of static stability: the fast and the general way, of the network and of any other plan."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -45,39 +45,6 @@ def test_a_foreign_controller_has_the_same_losses_whatever_is_held_at_a_time(hel
     assert plan.done == 400
     assert np.array_equal(whole, LDVS.begin(starts, velocity, STRIDE).first_losses(steps))
     assert hexmj.flss(Own(), [0.5], n_starts=50).equals(hexmj.flss(LDVS, [0.5], n_starts=50))
-
-
-@dataclass
-class AllStand:
-    """A plan in which nothing happens, that keeps how many steps it was asked for each time."""
-
-    starts: np.ndarray
-    stride: hexmj.Stride = STRIDE
-    done: int = 0
-    asked: list[int] = field(default_factory=list)
-
-    def advance(self, steps):
-        """See `protocol.Plan`."""
-        self.done += steps
-        self.asked.append(steps)
-        shape = steps, *self.starts.shape
-        return PlannedWalk(
-            time=np.arange(self.done - steps + 1, self.done + 1) * STRIDE.dt,
-            velocity=np.zeros(shape[:2]),
-            x=np.broadcast_to(self.starts, shape),
-            y=np.broadcast_to(np.array(STRIDE.geometry.y), shape),
-            stance=np.ones(shape, dtype=bool),
-            aep=np.zeros(shape),
-            height=np.zeros(shape),
-        )
-
-
-@pytest.mark.parametrize(("size", "asked"), [(1, [200, 200, 50]), (2000, [200, 200, 50]), (4000, 4 * [100] + [50])])
-def test_no_more_is_planned_at_a_time_than_is_to_be_held(size, asked):
-    """400,000 steps of a start, and 200 steps."""
-    plan = AllStand(np.zeros((size, 6)))
-    assert not planned_losses(plan, np.array([450])).any()
-    assert plan.asked == asked
 
 
 def test_a_loss_in_the_last_step_that_is_looked_at_counts():

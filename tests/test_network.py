@@ -228,14 +228,6 @@ def test_mirrored_starts_give_mirrored_walks(controller, order):
     assert np.array_equal(walked.stance[:, :, MIRROR], mirrored.stance)
 
 
-def test_velocities_of_single_starts():
-    starts = random_starts(np.random.default_rng(5), 4)
-    speeds = np.array([0.1, 0.2, 0.5, 0.9])
-    together = walk(starts, LDVS, speeds, 40.0)
-    for i, v in enumerate(speeds):
-        assert np.array_equal(together.x[:, i], walk(starts[i : i + 1], LDVS, v, 40.0).x[:, 0])
-
-
 def test_acceleration_is_eq_11_step_by_step():
     acceleration = Acceleration(rate=0.013, start=0.1)
     walked = walk(np.zeros((1, 6)), UNCOORDINATED, 0.3, 30.0, acceleration=acceleration)

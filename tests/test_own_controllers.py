@@ -1,6 +1,5 @@
 """The examples' controllers: interface, both measures, and bodies that follow the plan."""
 
-import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -205,23 +204,6 @@ def test_heights_are_honoured(unchanged):
     up = puppet.planned_tip.values[..., 2] - puppet.qpos.values[:, None, 2]
     foot = up[walked.planned.stance[:, 0]].max()
     assert up == pytest.approx(np.where(walked.planned.stance[:, 0], foot, foot + 5.0))
-
-
-@pytest.mark.slow
-def test_a_posture_of_ones_own_is_honoured():
-    """All feet reach 2 mm deeper: the body stands 2 mm higher."""
-    walked, _ = walked_by(lambda walk, done: {"height": np.where(walk.stance[0], -2.0 * min(1.0, done / 200), 8.0)})
-    usual, _ = walked_by(lambda walk, _: {"height": np.where(walk.stance[0], 0.0, 8.0)})
-    higher = walked.qpos[300:, :, 2] - usual.qpos[300:, :, 2]
-    assert np.mean(higher) == pytest.approx(2.0, abs=0.3)
-
-
-def test_flss_of_a_controller_on_the_command_line(run):
-    name = OWN["turning"]
-    options = "--velocity", 0.5, "--starts", 4, "--observation-time", 30, "--physical", "--json"
-    code, out, _ = run("flss", "--controller", name, *options)
-    assert code == 0
-    assert json.loads(out)
 
 
 @dataclass(frozen=True)

@@ -34,18 +34,6 @@ def test_what_a_step_leaves_out_is_as_usual():
     assert same(walk, hexmj.walk(hexmj.draw_starts(2, 0), LDVS, 0.5, 0.5))
 
 
-def test_a_step_may_be_worked_on_in_place():
-    """What was planned stays as it was."""
-    x = np.zeros((1, 6))
-
-    def step(v):
-        np.subtract(x, 1.0, out=x)
-        return Step(x, True)
-
-    walk = stepwise(step, np.zeros((1, 6)), 0.5, STRIDE).advance(3)
-    assert np.array_equal(walk.x[:, 0, 0], [-1.0, -2.0, -3.0])
-
-
 def test_a_refusal_names_the_step_of_the_walk_though_it_is_looked_at_in_parts():
     count = iter(range(1000))
     plan = stepwise(lambda v: Step(np.nan if next(count) == 777 else 0.0, True), np.zeros((1, 6)), 0.5, STRIDE)
