@@ -13,7 +13,7 @@ import xarray as xr
 from hexmj.controllers.cruse1998 import HWS, LDVS, MODEL_VARIANTS, PRESETS
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import flss, walk
-from hexmj.paper.claims import claims
+from hexmj.paper.claims import Band, claims
 from hexmj.paper.figures import FIGURES
 from hexmj.paper.measurements import losses, losses_after
 from hexmj.paper.protocol import (
@@ -30,7 +30,6 @@ from hexmj.paper.protocol import (
 )  # fmt: skip
 from hexmj.paper.quantities import Measured, Weight
 from hexmj.paper.reproduce import measure, reproduce
-from hexmj.paper.rules import Band
 from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, steps_within

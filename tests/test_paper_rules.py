@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hexmj.paper.claims import Claim, claims
+from hexmj.paper.claims import Answer, Band, Claim, Rule, Seen, claims, fisher
 from hexmj.paper.quantities import Gaits, Losses, Measured, main_peak
 from hexmj.paper.reproduce import Row, summary, verdict
-from hexmj.paper.rules import Answer, Band, Rule, Seen, fisher
 
 
 def losses(*rates: float, starts: int = 1000, velocities: tuple[float, ...] = (0.1, 0.2, 0.3)) -> xr.Dataset:

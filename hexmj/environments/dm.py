@@ -6,6 +6,7 @@ dm_control's PhysicsError. Without a display, set MUJOCO_GL=egl before the impor
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from dm_control import mujoco
@@ -15,12 +16,8 @@ from dm_env import specs
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.mjcf import check_home, compile_body
-from hexmj.conditions import Conditions
-from hexmj.controllers.cruse1998 import LDVS
-from hexmj.controllers.protocol import Controller
 from hexmj.environments.observing import worth
 from hexmj.environments.task import (
-    Actions,
     Task,
     action_bounds,
     action_names,
@@ -31,45 +28,32 @@ from hexmj.environments.task import (
 from hexmj.environments.walkers import Acted, Alone, Walkers
 from hexmj.physics.engine import Diverged
 from hexmj.physics.substeps import Shown
-from hexmj.timing import Stride
 from hexmj.validate import whole
 
 ONLY = np.array([0])
 """Index of the only insect."""
 
 
-def load(
-    velocity: float = 0.3,
-    *,
-    actions: Actions = "joints",
-    controller: Controller = LDVS,
-    conditions: Conditions | None = None,
-    stride: Stride | None = None,
-    duration: float = 200.0,
-    seed: int = 0,
-) -> control.Environment:
+def load(velocity: float = 0.3, *, seed: int = 0, **task: Any) -> control.Environment:
     """Return the environment, for example for `dm_control.viewer.launch`.
 
     Args:
         velocity: commanded V_r, 0 < V < 1, as a fraction of V_p.
-        actions: 'joints', targets of all joints, (leg * joint,) [rad] within the joints' ranges; or 'tips',
-            offsets to the planned tips, (leg * axis,) [mm]: forward, left, up.
-        controller: controller that plans the walk.
-        conditions: conditions of the walk.
-        stride: stride of the plan; its time step is that of the environment.
-        duration: duration of an episode [time units].
         seed: seed of the starts; the episodes take the starts of `draw_starts` in order.
+        task: actions, controller, conditions, stride, duration, see `task.Task`. The actions 'joints' are targets of
+            all joints, (leg * joint,) [rad] within the joints' ranges; 'tips' are offsets to the planned tips,
+            (leg * axis,) [mm]: forward, left, up.
 
     Raises:
         InputError: a value is out of its range; `step` raises it for an action.
     """
-    conditions, stride = conditions or Conditions(), stride or Stride()
-    task = Task(velocity, actions, controller, conditions, stride, duration)
+    settings = Task(velocity, **task)
+    conditions, stride = settings.conditions, settings.stride
     compiled = compile_body(conditions, conditions.timestep(stride))
     check_home(compiled)
     physics = InsectPhysics.from_model(wrapper.MjModel(compiled.model))
     physics.compiled = compiled
-    return control.Environment(physics, Walking(task, seed), n_sub_steps=task.substeps)
+    return control.Environment(physics, Walking(settings, seed), n_sub_steps=settings.substeps)
 
 
 class InsectPhysics(mujoco.Physics):
@@ -154,9 +138,8 @@ class Walking(control.Task):
     def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
         """Return the bounds of an action; tabs separate the names of its numbers."""
         low, _, high = action_bounds(physics.compiled, self.task)
-        return specs.BoundedArray(
-            low.shape, float, low, high, name="\t".join(action_names(physics.compiled, self.task))
-        )
+        names = "\t".join(action_names(physics.compiled, self.task))
+        return specs.BoundedArray(low.shape, float, low, high, names)
 
     def observation_spec(self, physics: InsectPhysics) -> dict[str, specs.BoundedArray]:
         """Return the specs of all observations by name."""

@@ -111,24 +111,24 @@ def observation_bounds(compiled: CompiledBody, task: Task) -> dict[str, tuple[np
     lengths, ranges = compiled.body.lengths, compiled.model.actuator_ctrlrange[compiled.columns.ctrl]
     far, tall = -lengths.no_foot_margin, compiled.body.standing_height
     fastest = np.sqrt(2.0 * compiled.weight / compiled.body.mass * FASTEST * tall)
-    size, legs = (compiled.joints,), (len(LEGS),)
-    bounds = {
-        "joint_angles": (ranges[:, 0] - BEYOND_RANGE, ranges[:, 1] + BEYOND_RANGE),
-        "joint_velocities": _uniform(size, -FASTEST_TURN, FASTEST_TURN),
-        "orientation": _uniform((4,), -1.0, 1.0),
-        "velocity": _uniform((3,), -fastest, fastest),
-        "angular_velocity": _uniform((3,), -FASTEST_TURN, FASTEST_TURN),
-        "clearance": _uniform((1,), -lengths.shortest_leg, FASTEST * tall),
-        "tips": _uniform((6, 3), -far, far),
-        "contact": _uniform(legs, 0.0, 1.0),
-        "margin": _uniform((1,), -far, far),
-        "command": _uniform((1,), 0.0, lengths.fastest_swing),
-        "planned_stance": _uniform(legs, 0.0, 1.0),
-        "planned_tips": _uniform((6, 3), -far, far),
+    size, legs = compiled.joints, len(LEGS)
+    bounds: dict[str, Any] = {
+        "joint_angles": (size, ranges[:, 0] - BEYOND_RANGE, ranges[:, 1] + BEYOND_RANGE),
+        "joint_velocities": (size, -FASTEST_TURN, FASTEST_TURN),
+        "orientation": (4, -1.0, 1.0),
+        "velocity": (3, -fastest, fastest),
+        "angular_velocity": (3, -FASTEST_TURN, FASTEST_TURN),
+        "clearance": (1, -lengths.shortest_leg, FASTEST * tall),
+        "tips": ((legs, 3), -far, far),
+        "contact": (legs, 0.0, 1.0),
+        "margin": (1, -far, far),
+        "command": (1, 0.0, lengths.fastest_swing),
+        "planned_stance": (legs, 0.0, 1.0),
+        "planned_tips": ((legs, 3), -far, far),
     }
     if task.actions == "tips":
-        bounds["out_of_reach"] = _uniform(legs, 0.0, float(task.substeps))
-    return bounds
+        bounds["out_of_reach"] = (legs, 0.0, float(task.substeps))
+    return {name: (np.full(shape, low), np.full(shape, high)) for name, (shape, low, high) in bounds.items()}
 
 
 def action_names(compiled: CompiledBody, task: Task) -> tuple[str, ...]:
@@ -167,7 +167,3 @@ def checked_actions(
 def draw_start(rng: np.random.Generator, task: Task) -> np.ndarray:
     """Draw the next start of one insect, (1, leg) [mm]; with the same seed as `draw_starts`, the same starts."""
     return rng.uniform(task.stride.pep0, task.stride.aep0, (1, 6))
-
-
-def _uniform(shape: tuple[int, ...], low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
-    return np.full(shape, low), np.full(shape, high)

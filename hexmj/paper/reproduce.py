@@ -12,11 +12,10 @@ from hexmj.controllers.cruse1998 import named_variant
 from hexmj.errors import InputError
 from hexmj.files import write_text
 from hexmj.measures.tables import VELOCITY
-from hexmj.paper.claims import Claim, claims, in_physics
+from hexmj.paper.claims import Answer, Claim, claims, in_physics
 from hexmj.paper.figures import FIGURES, SAMPLES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, Reproduction, cells, searched_seeds
 from hexmj.paper.quantities import Measured
-from hexmj.paper.rules import Answer
 from hexmj.progress import part_of, shown
 from hexmj.sweep import Execution, over_axes, run_cells
 from hexmj.timing import OBSERVATION_TIMES

@@ -69,7 +69,7 @@ class FieldsForm:
     @property
     def begin(self) -> np.ndarray:
         """(parameter,) vector from which a search begins by default: the usual values."""
-        return self.vector(self.usual)
+        return np.array([float(getattr(self.usual, name)) for name in self.names])
 
     def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Return least and greatest values of the first population, (parameter,) each.
@@ -90,13 +90,11 @@ class FieldsForm:
         Raises:
             InputError: it is of another class, or differs in a field that is not searched.
         """
-        usual: Any = self.usual
-        if type(controller) is not type(usual):
-            raise InputError(f"begin = {controller.name}; expected a {type(usual).__name__}, which is searched")
-        kept = [one.name for one in fields(usual) if one.init and one.name not in (*self.names, "name")]
-        if different := [name for name in kept if plain(getattr(controller, name)) != plain(getattr(usual, name))]:
-            raise InputError(f"begin = {controller.name} has another {different[0]} than the searched controller")
-        return np.array([float(getattr(controller, name)) for name in self.names])
+        if type(controller) is type(self.usual):
+            vector = FieldsForm(controller).begin
+            if plain(controller) | {"name": ""} == plain(self.controller(vector)) | {"name": ""}:
+                return vector
+        raise InputError(f"begin = {controller.name}; expected {self.usual.name}, with other {', '.join(self.names)}")
 
 
 @dataclass(frozen=True)

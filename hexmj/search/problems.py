@@ -1,9 +1,8 @@
 """What is minimised (paper, Section 3): Problem 1, a fixed velocity, and Problem 2, velocities drawn from a range."""
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -20,7 +19,6 @@ from hexmj.search.algorithms import Domain
 from hexmj.search.forms import Form, NetworkForm
 from hexmj.starts import draw_starts
 from hexmj.stats import wilson_intervals
-from hexmj.threads import thread_count
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
 from hexmj.validate import choice, number
 from hexmj.variants import variants, varied
@@ -171,31 +169,20 @@ class Sample:
     def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
         """Return G of each candidate, (candidate,), from (candidate, parameter)."""
         self.settle(threads)
-        problem = self.problem
-
-        def cost(one: Sample, vector: np.ndarray, threads: int | None) -> float:
-            if problem.refusal(vector):
-                return REFUSED
-            try:
-                return one._cost(one.problem.controller(vector), threads)
-            except (OutOfReach, Refused, SimulationError):
-                return REFUSED
-
-        # Plans of other controllers may share arrays of their module, and hold the interpreter's lock anyway.
-        if problem.conditions or len(vectors) == 1 or not isinstance(problem.form, NetworkForm):
-            values = [[cost(one, vector, threads) for vector in vectors] for one in self.variants.values()]
-        else:
-            with ThreadPoolExecutor(thread_count(threads)) as pool:
-                values = [list(pool.map(partial(cost, one, threads=1), vectors)) for one in self.variants.values()]
-        return self._combined(values)
+        return self._combined([[one._cost(vector, threads) for vector in vectors] for one in self.variants.values()])
 
     def _combined(self, values: Any) -> np.ndarray:
         """Combine values of all variants, (variant, ...), into the one that is minimised, (...)."""
         return np.mean(values, axis=0) if self.problem.over == "mean" else np.max(values, axis=0)
 
-    def _cost(self, candidate: Controller, threads: int | None) -> float:
+    def _cost(self, vector: np.ndarray, threads: int | None) -> float:
         """Return FLSS; if ties are broken, the mean part of the time lost counts as one more start."""
-        times, (ends,) = self._times(candidate, [self.problem.observation_time], threads)
+        if self.problem.refusal(vector):
+            return REFUSED
+        try:
+            times, (ends,) = self._times(self.problem.controller(vector), [self.problem.observation_time], threads)
+        except (OutOfReach, Refused, SimulationError):
+            return REFUSED
         lost = (times <= ends).sum().item()
         if self.problem.ties == "equal":
             return lost / self.n_starts

@@ -174,15 +174,12 @@ def convergence_figure(history: "xr.Dataset") -> "Figure":
     """Draw all candidates' costs and the least so far against the number of evaluations, from `stages.history`."""
     figure = picture(6.8, 4.2)
     axes = figure.subplots()
-    history = history.sortby("evaluation")
-    evaluation = history.evaluation.values + 1
     for number, (stage, colour) in enumerate(COLOURS.items()):
-        of_stage = history.stage.values == number
-        if of_stage.any():
-            x, cost, best = evaluation[of_stage], history.cost.values[of_stage], history.best.values[of_stage]
-            axes.plot(x, cost, ".", color=colour, markersize=2.5, alpha=0.35)
-            marker = "o" if len(x) == 1 else None  # a line needs two points
-            axes.plot(x, best, color=colour, linewidth=1.8, marker=marker, label=stage)
+        one = history.isel(evaluation=history.stage.values == number).sortby("evaluation")
+        if one.sizes["evaluation"]:
+            evaluation = one.evaluation + 1
+            axes.plot(evaluation, one.cost, ".", color=colour, markersize=2.5, alpha=0.35)
+            axes.plot(evaluation, one.best, color=colour, linewidth=1.8, label=stage)
     cost = history.cost.attrs["long_name"]
     label = f"{'FLSS' if cost == 'FLSS' else 'cost'} on the starts of the stage"
     axes.set(xlabel="evaluations of the cost function", ylabel=label, ylim=(-0.02, 1.02))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,13 +19,12 @@ from hexmj.search.algorithms import CovarianceAdaptation, Evolution, refine, sea
 from hexmj.search.problems import REFUSED, Problem, Sample
 from hexmj.starts import SAMPLE, check_draw
 from hexmj.sweep import CachedValues, Cell
-from hexmj.threads import thread_count
 from hexmj.validate import choice, whole
 
 if TYPE_CHECKING:
     import xarray as xr
 
-STAGES = ("population", "simplex")
+STAGES: tuple[str, ...] = ("population", "simplex")
 
 
 @dataclass(frozen=True)
@@ -137,17 +136,14 @@ def search(
         InputError: settings that make no sense, or a best candidate that its controller refuses.
         SimulationError: a start does not settle, or the best candidate's simulation fails.
     """
-    thread_count(threads)
     effort = effort.completed(physical=problem.conditions is not None)
     domain = problem.domain(effort.domain, effort.beginning)
-    budgets = {"population": effort.budget, "simplex": effort.refine_budget}
-    sizes = {"population": effort.starts or 0, "simplex": effort.refine_starts or 0}
+    budgets = dict(zip(STAGES, (effort.budget, effort.refine_budget), strict=True))
+    sizes = dict(zip(STAGES, (effort.starts or 0, effort.refine_starts or 0), strict=True))
     work = sum(budgets[stage] * sizes[stage] for stage in STAGES)
     samples = {stage: Sample(problem, sizes[stage], effort.seed) for stage in STAGES if budgets[stage]}
-    cached = {
-        stage: CachedValues(Cell(stage, sample.costs, {}), folder, threads=threads, fresh=fresh)
-        for stage, sample in samples.items()
-    }
+    how: Any = {"threads": threads, "fresh": fresh}
+    cached = {stage: CachedValues(Cell(stage, one.costs, {}), folder, **how) for stage, one in samples.items()}
     evaluated: list[Evaluated] = []
     with shown(progress, "searching") as advance:
         for sample in samples.values():
@@ -190,19 +186,17 @@ def history(evaluated: Sequence[Evaluated], names: Sequence[str], minimised: str
 
     `names` are those of the parameters, and `minimised` is the cost in words.
     """
+    import pandas as pd
     import xarray as xr
 
-    stage = np.concatenate([np.full(len(costs), STAGES.index(name)) for name, _, costs in evaluated])
-    cost = np.concatenate([costs for *_, costs in evaluated])
-    best = cost.copy()
-    for number in range(len(STAGES)):
-        best[stage == number] = np.minimum.accumulate(cost[stage == number])
-    candidates = np.concatenate([candidates for _, candidates, _ in evaluated])
+    stages, candidates, costs = zip(*evaluated, strict=True)
+    stage, cost = np.repeat([STAGES.index(one) for one in stages], [*map(len, costs)]), np.concatenate(costs)
+    best = pd.Series(cost).groupby(stage).cummin().values
     flags = {"flag_values": [0, 1], "flag_meanings": " ".join(STAGES)}
     return xr.Dataset(
         {
             "stage": ("evaluation", stage, flags),
-            "candidate": (("evaluation", "parameter"), candidates, {"long_name": "parameters"}),
+            "candidate": (("evaluation", "parameter"), np.concatenate(candidates), {"long_name": "parameters"}),
             "cost": ("evaluation", cost, {"units": "1", "long_name": minimised}),
             "best": ("evaluation", best, {"units": "1", "long_name": f"least so far of the stage: {minimised}"}),
         },
