@@ -198,19 +198,13 @@ def test_a_search_keeps_order_and_model_variant_of_its_beginning(tmp_path: Path)
     ("make", "name"),
     [
         (lambda: Problem(HWS, 0.5, 0.1), "velocity"),
-        (lambda: Problem(HWS, 0.5, 1.0), "velocity"),
-        (lambda: Problem(HWS, 0.0, 0.5), "velocity"),
         (lambda: Problem(hexmj.HWS, 0.4, 0.5), "form"),  # pyright: ignore[reportArgumentType]
         (lambda: Problem(HWS, 0.5, 0.5, feedback=True), "feedback"),
         (lambda: Problem(FieldsForm(Pace()), 0.5, 0.5, over="mean"), "over"),
         (lambda: NetworkForm("lvds"), "form"),  # pyright: ignore[reportArgumentType]
         (lambda: NetworkForm("hws", "x"), "order"),  # pyright: ignore[reportArgumentType]
-        (lambda: Effort(budget=0), "budget"),
-        (lambda: Effort("annealing"), "algorithm"),  # pyright: ignore[reportArgumentType]
         (lambda: Effort("cmaes", population=3), "population"),
         (lambda: Effort(refine_starts=0), "refine_starts"),
-        (lambda: Effort(seed=-1), "seed"),
-        (lambda: search(PROBLEM, Effort(domain=0.0)), "domain"),
         (lambda: search(PROBLEM, Effort(begin=Pace())), "begin"),
         (lambda: search(PROBLEM, Effort(begin="ldvs")), "begin"),
         (lambda: named_form("nothing"), "form"),

@@ -1,7 +1,5 @@
 """The cost of a candidate is its FLSS on the same starts, kinematic or physical, with ties or without."""
 
-import time
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,7 +7,6 @@ import pytest
 
 import hexmj
 from hexmj import FieldsForm, NetworkForm, Problem
-from hexmj.controllers import Step, stepwise
 from hexmj.search.forms import FORMS
 from hexmj.search.problems import Sample
 from hexmj.search.results import convergence_figure
@@ -64,31 +61,6 @@ def test_the_physical_cost_is_the_physical_flss(feedback):
             verdict.sel(observation_time="walk")
             == hexmj.physical_flss(walked, [0.6], observation_time="walk", **how).flss.item()
         )
-
-
-SCRATCH = np.zeros(1)
-"""What careless controllers share."""
-
-
-@dataclass(frozen=True)
-class Careless(Pace):
-    """Its plans go through an array of this module."""
-
-    def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        def step(v: np.ndarray) -> Step:
-            SCRATCH[0] = self.good
-            time.sleep(1e-3)  # for other threads
-            return Step(starts, starts < 10.0 * SCRATCH[0])
-
-        return stepwise(step, starts, velocity, stride, acceleration)
-
-
-def test_candidates_that_share_an_array_of_their_module_are_walked_one_after_the_other():
-    sample = Sample(Problem(FieldsForm(Careless()), 0.4, 0.4, observation_time=1.0), 50, 0)
-    vectors = np.array([[good, 0.0] for good in (0.5, 1.0, 0.0, 2.0)])
-    alone = [sample.costs(vector[None])[0] for vector in vectors]
-    assert len(set(alone)) > 2
-    assert sample.costs(vectors, threads=4).tolist() == alone
 
 
 def test_ties_are_broken_by_later_losses_and_nothing_else_is():

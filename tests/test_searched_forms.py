@@ -65,7 +65,7 @@ class Picky(Pace):
 
     def __post_init__(self):
         if not self.least <= self.good < 2.01:
-            raise ValueError(f"good = {self.good} is out of the range that I allow")
+            raise InputError(f"good = {self.good} is out of the range that I allow")
 
 
 def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
@@ -74,7 +74,7 @@ def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
     good = found.history.candidate.sel(parameter="good")
     refused = (good < 2) | (good >= 2.01)
     assert len(found.refused) == found.history.attrs["refused"] == refused.sum() > 0
-    assert found.refused[0].startswith("ValueError: good = ")
+    assert found.refused[0].startswith("InputError: good = ")
     with pytest.raises(InputError, match="4 of 4 candidates were refused"):
         search(problem, Effort("cmaes", population=4, budget=4, starts=5, refine_budget=0, seed=1))
 
@@ -83,14 +83,11 @@ def test_what_a_controller_refuses_is_counted_and_none_of_it_wins():
 class Late(Pace):
     """Refuses as it begins, if it is not usual."""
 
-    least: int = 2
-
     def __post_init__(self):
         """Refuses nothing."""
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
-        if not self.least <= self.good < 2.01:
-            raise InputError(f"good = {self.good} is too late")
+        Picky(self.good)
         return super().begin(starts, velocity, stride, acceleration, threads)
 
 
@@ -99,7 +96,7 @@ def test_a_candidate_that_refuses_to_walk_costs_as_one_that_loses_all_and_none_o
     assert Sample(problem, 5, 0).costs(np.array([[1.5, -0.5]])).tolist() == [1.0]
     found = search(problem, Effort(starts=20, budget=30, refine_budget=0))
     assert 2 <= found.vector[0] < 2.01 and found.cost < 1
-    with pytest.raises(InputError, match="too late"):
+    with pytest.raises(InputError, match="out of the range"):
         search(problem, Effort("cmaes", population=4, budget=4, starts=5, refine_budget=0, seed=1))
 
 
