@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, LEGS, Geometry
@@ -37,69 +36,59 @@ class Leg:
 
 @dataclass(frozen=True)
 class Servo:
-    """What the gains of the joints are computed from, see `gains`."""
+    """What the gains of the joints are computed from, see `bodies.mjcf`."""
 
-    step: float
+    step: float = 0.001
     """The time step for which the joints are as stiff as it allows [s]."""
-    damping_ratio: float
+    damping_ratio: float = 1.0
     """Of the lightest motion of each joint; 1 is critical."""
-    digits: int
+    digits: int = 2
     """Significant digits of the gains."""
-
-    def __post_init__(self) -> None:
-        _check_positive("Servo", step=(self.step, "s"), damping_ratio=(self.damping_ratio, ""))
-        if not 1 <= self.digits <= 17:
-            raise InputError(f"Servo: digits = {self.digits}; expected 1 to 17")
 
 
 @dataclass(frozen=True)
 class Lengths:
-    """The lengths, and one speed, that limits and tolerances are made of."""
+    """The lengths, and one speed, that limits and tolerances are made of; by default those of the stick insect."""
 
-    highest_lift: float
+    highest_lift: float = 14.0
     """Greatest height to which a swinging foot is lifted [mm]."""
-    highest_stand: float
+    highest_stand: float = 14.0
     """Greatest standing height [mm]."""
-    slowest_swing: float
+    slowest_swing: float = 0.1
     """Least velocity V_p of a protracting tip relative to the body [mm/s]."""
-    fastest_swing: float
+    fastest_swing: float = 2000.0
     """Greatest velocity V_p [mm/s]."""
-    shortest_leg: float
+    shortest_leg: float = 31.0
     """Length of the shortest leg [mm]: no obstacle is taller, and a gap is as deep."""
-    farthest_centre_of_mass: float
+    farthest_centre_of_mass: float = 30.0
     """How far the centre of mass may be moved ahead or back [mm]."""
-    load_gyration: float
+    load_gyration: float = 2.0
     """Radius of gyration of what is carried [mm]."""
-    nearest_obstacle: float
+    nearest_obstacle: float = 45.0
     """Least distance of what lies ahead from O at the start, ahead of the front feet [mm]."""
-    farthest_obstacle: float
+    farthest_obstacle: float = 10000.0
     """Greatest distance of what lies ahead from O at the start [mm]."""
-    longest_obstacle: float
+    longest_obstacle: float = 1000.0
     """Greatest length of a gap or a hurdle along the way [mm]."""
-    highest_bump: float
+    highest_bump: float = 8.0
     """Height of the highest bump of rough ground [mm]; bumps are caps of spheres, twice as wide."""
-    bump_spacing: float
+    bump_spacing: float = 12.0
     """Distance of the bumps' centres [mm]; neighbours leave only small gaps."""
-    ground_half_width: float
+    ground_half_width: float = 200.0
     """Half the width of everything that lies ahead [mm]."""
-    ground_reach: float
+    ground_reach: float = 1000.0
     """How far steps and the banks of a gap reach [mm]."""
-    speed_at_rest: float
+    speed_at_rest: float = 5.0
     """Speed of the root below which a start counts as settled [mm/s]."""
-    tracking_bin: float
+    tracking_bin: float = 0.01
     """Width of the bins in which distances of feet from their targets are counted [mm]."""
-    tracking_bins: int
+    tracking_bins: int = 2000
     """Number of these bins; greater distances are counted together."""
-    largest_tip_offset: float
+    largest_tip_offset: float = 5.0
     """Greatest offset of a planned tip in each direction that an environment's action may ask for [mm]."""
-    no_foot_margin: float
+    no_foot_margin: float = -100.0
     """Stands for the stability margin of a body without a foot on the ground [mm]; a foot in contact gives more,
     since no leg reaches so far."""
-
-    def __post_init__(self) -> None:
-        positive = {field.name: (getattr(self, field.name), "") for field in fields(self)}
-        positive["no_foot_margin"] = (-self.no_foot_margin, "with the sign turned")
-        _check_positive("Lengths", **positive)
 
     @property
     def lowest_bump(self) -> float:
@@ -120,17 +109,17 @@ class Lengths:
 class Marks:
     """Sizes of the marks that a film draws on the ground and at the tips [mm]."""
 
-    fill_height: float
+    fill_height: float = 0.05
     """Height of the support polygon's area over the ground; its outline lies on the ground."""
-    outline: float
+    outline: float = 0.45
     """Radius of the polygon's outline."""
-    plumb_line: float
+    plumb_line: float = 0.12
     """Radius of the line from the centre of mass down to the ground."""
-    rim: tuple[float, float]
+    rim: tuple[float, float] = (2.4, 0.3)
     """Radius and half height of the disc whose rim shows whether the body is stable."""
-    centre: tuple[float, float]
+    centre: tuple[float, float] = (1.6, 0.4)
     """Radius and half height of the disc below the centre of mass."""
-    tip: float
+    tip: float = 1.0
     """Radius of the ball at a planned tip."""
 
 
@@ -174,16 +163,15 @@ class Body:
         return f"Body({self.name!r}, {self.mjcf.name})"
 
     def __post_init__(self) -> None:
-        _check_positive(
-            f"body {self.name!r}",
-            mass=(self.mass, "g"),
-            standing_height=(self.standing_height, "mm"),
-            longest_step=(self.longest_step, "s"),
-        )
         for fault in self._faults():
             raise InputError(f"body {self.name!r}: {fault}")
 
     def _faults(self) -> Iterator[str]:
+        numbers = {name: getattr(self, name) for name in ("mass", "standing_height", "longest_step")}
+        numbers |= vars(self.servo) | vars(self.lengths) | {"no_foot_margin": -self.lengths.no_foot_margin}
+        for name, number in numbers.items():
+            if not 0 < number < math.inf:
+                yield f"{name} = {number}; expected a finite number above 0"
         if not self.mjcf.is_file():
             yield f"mjcf = {str(self.mjcf)!r} is no file; expected the body's MJCF"
         if not self.trunk:
@@ -210,17 +198,6 @@ class Body:
     def feet(self) -> tuple[str, ...]:
         """Names of the feet, (leg,)."""
         return tuple(leg.foot for leg in self.legs)
-
-    def text(self) -> str:
-        """Text of its MJCF."""
-        return self.mjcf.read_text(encoding="utf-8")
-
-
-def _check_positive(what: str, **values: tuple[Any, str]) -> None:
-    """Refuse numbers that are not finite and above 0; `values` are named pairs of number and unit."""
-    for name, (value, unit) in values.items():
-        if not 0 < value < math.inf:
-            raise InputError(f"{what}: {name} = {value}; expected a finite number above 0 {unit}".rstrip())
 
 
 JOINTS = ("thorax_coxa", "coxa_trochanter", "femur_tibia")
@@ -257,28 +234,8 @@ STICK_INSECT = Body(
     standing_height=10.0,
     longest_step=0.000625,
     mass=1.0,
-    servo=Servo(step=0.001, damping_ratio=1.0, digits=2),
-    lengths=Lengths(
-        highest_lift=14.0,
-        highest_stand=14.0,
-        slowest_swing=0.1,
-        fastest_swing=2000.0,
-        shortest_leg=31.0,
-        farthest_centre_of_mass=30.0,
-        load_gyration=2.0,
-        nearest_obstacle=45.0,
-        farthest_obstacle=10000.0,
-        longest_obstacle=1000.0,
-        highest_bump=8.0,
-        bump_spacing=12.0,
-        ground_half_width=200.0,
-        ground_reach=1000.0,
-        speed_at_rest=5.0,
-        tracking_bin=0.01,
-        tracking_bins=2000,
-        largest_tip_offset=5.0,
-        no_foot_margin=-100.0,
-    ),
-    marks=Marks(fill_height=0.05, outline=0.45, plumb_line=0.12, rim=(2.4, 0.3), centre=(1.6, 0.4), tip=1.0),
+    servo=Servo(),
+    lengths=Lengths(),
+    marks=Marks(),
 )
 """The insect of this package; standing height and times of `hexmj.conditions` are usual for it."""

@@ -49,7 +49,7 @@ def at_home(compiled: CompiledBody) -> mujoco.MjData:
 
 def changed_body(folder: Path, changes: dict[str, str]) -> Body:
     """The stick insect with some words of its MJCF replaced."""
-    text = STICK_INSECT.text()
+    text = STICK_INSECT.mjcf.read_text()
     for old, new in changes.items():
         assert old in text
         text = text.replace(old, new)

@@ -39,7 +39,7 @@ LONG = ("fron", "midd", "hind")
 
 def renamed(folder: Path, factor: float = 1.05) -> Body:
     """The stick insect with every name another, legs longer by a factor, and its home posture anew."""
-    tree = ElementTree.fromstring(STICK_INSECT.text())
+    tree = ElementTree.fromstring(STICK_INSECT.mjcf.read_text())
     placed = [e for e in tree.iter() if e.get("name", "").endswith(("_femur", "_tibia", "_foot"))]
     drawn = [geom for one in tree.iter("default") if one.get("class", "")[:4] in LONG for geom in one.findall("geom")]
     for element in (*placed, *drawn):

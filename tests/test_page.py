@@ -19,7 +19,7 @@ from hexmj.conditions import Conditions, GroundKind
 from hexmj.controllers.cruse1998 import UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.measures.physical import PhysicalWalk, physical_walk
-from hexmj.rendering.shapes import body_shape, geom_shape, ground_shape
+from hexmj.rendering.shapes import body_shapes, geom_shape, ground_shape, joined
 from hexmj.replay.page import page, page_text
 from hexmj.replay.recording import record, record_plan
 from hexmj.replay.take import Take
@@ -133,15 +133,15 @@ def test_the_ground_has_its_height(ground: GroundKind):
 
 def test_colours_are_mujoco_s_and_hidden_geoms_have_no_faces():
     model = compile_body(Conditions()).model
-    seen = body_shape(model)
+    seen = joined(body_shapes(model))
     model.geom_rgba[model.geom_matid >= 0] = 1.0, 0.0, 1.0, 1.0
-    assert not np.array_equal(body_shape(model).colour, seen.colour)
+    assert not np.array_equal(joined(body_shapes(model)).colour, seen.colour)
     group = model.geom_group.copy()
     model.geom_group[:] = 3
     assert len(seen.faces) > 1000
-    assert len(body_shape(model).faces) == 0
+    assert len(joined(body_shapes(model)).faces) == 0
     model.geom_group[:], model.geom_rgba[:] = group, 0.0
-    assert len(body_shape(model).faces) == 0
+    assert len(joined(body_shapes(model)).faces) == 0
 
 
 def test_a_page_loads_nothing_and_no_title_ends_its_script(fallen, plan, tmp_path):

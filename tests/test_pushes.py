@@ -95,9 +95,6 @@ def test_a_push_depends_on_no_start_beside(vp):
 
 
 BAD: dict[str, tuple[Any, Any]] = {
-    "not finite": (np.array([0.0, np.nan]), np.zeros(2)),
-    "time not finite": (np.zeros(2), np.array([0.0, np.inf])),
-    "no numbers": ("hard", np.zeros(2)),
     "one start": (np.ones(1), np.zeros(1)),
     "before the walk": (np.ones(2), np.array([0.0, -1.0])),
     "ends after the walk": (np.ones(2), np.array([0.0, 3.1])),

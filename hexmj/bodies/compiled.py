@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,59 +14,6 @@ from hexmj.body import ROOT_QPOS, ROOT_QVEL, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
-
-_COUNTS = (1 << mujoco.mjtConDataField.mjCONDATA_FOUND.value, 0, 1)
-"""`intprm` of a contact sensor that counts contacts, in one number."""
-
-_NET_FORCE = (1 << mujoco.mjtConDataField.mjCONDATA_FORCE.value, 3, 1)
-"""`intprm` of a contact sensor that adds up the forces of all contacts, in the world."""
-
-
-@dataclass(frozen=True)
-class SensorGroup:
-    """Sensors of one kind that are adjacent in `sensordata`."""
-
-    kind: mujoco.mjtSensor
-    """MuJoCo's type of the sensors."""
-    object_type: mujoco.mjtObj
-    """Type of the objects to which they are attached."""
-    objects: tuple[str, ...]
-    """Names of these objects, one for each sensor."""
-    names: tuple[str, ...]
-    """Names of the sensors that are added."""
-    contact: tuple[int, int, int] | None = None
-    """`intprm` of contact sensors."""
-    optional: bool = False
-    """Added only if the forces of the feet are measured; without them it has no columns."""
-
-    def find(self, model: mujoco.MjModel) -> slice | None:
-        """Find the sensors' columns of `sensordata`, or None if the model does not have them side by side."""
-        objects = np.array([mujoco.mj_name2id(model, self.object_type, name) for name in self.objects])
-        fits = (model.sensor_type == self.kind) & (model.sensor_objtype == self.object_type) & (model.sensor_refid < 0)
-        fits &= model.sensor_cutoff == 0
-        if self.contact:
-            fits &= (model.sensor_intprm[:, :3] == self.contact).all(axis=1)
-        attached = np.where(fits, model.sensor_objid, -1)
-        for first in range(model.nsensor - len(objects) + 1):
-            last = first + len(objects) - 1
-            if (attached[first : last + 1] == objects).all():
-                return slice(int(model.sensor_adr[first]), int(model.sensor_adr[last] + model.sensor_dim[last]))
-        return None
-
-
-def sensor_groups(body: Body) -> dict[str, SensorGroup]:
-    """The sensors of a walk, by the name of their field in `Columns`."""
-    sensor, objects = mujoco.mjtSensor, mujoco.mjtObj
-    site, geom, root = objects.mjOBJ_SITE, objects.mjOBJ_GEOM, objects.mjOBJ_BODY
-    touches, grounds = tuple(f"{leg}_touch" for leg in LEGS), tuple(f"{part}_ground" for part in body.trunk)
-    contact, pushes = sensor.mjSENS_CONTACT, tuple(f"{leg}_push" for leg in LEGS)
-    return {
-        "foot": SensorGroup(sensor.mjSENS_FRAMEPOS, site, body.feet, body.feet),
-        "touch": SensorGroup(sensor.mjSENS_TOUCH, site, body.feet, touches),
-        "trunk": SensorGroup(contact, geom, body.trunk, grounds, _COUNTS),
-        "centre_of_mass": SensorGroup(sensor.mjSENS_SUBTREECOM, root, (body.root,), ("centre_of_mass",)),
-        "feet_push": SensorGroup(contact, geom, body.feet, pushes, _NET_FORCE, optional=True),
-    }
 
 
 @dataclass(frozen=True)
@@ -114,7 +62,7 @@ class CompiledBody:
 
     @classmethod
     def of(cls, model: mujoco.MjModel, conditions: Conditions) -> "CompiledBody":
-        """Read the other fields from a model."""
+        """Read the other fields from a model with the sensors of `add_sensors`."""
         body = conditions.body
         return cls(
             model=model,
@@ -181,21 +129,38 @@ class CompiledBody:
         return self.kinematics.forward(joints)
 
 
+def add_sensors(spec: mujoco.MjSpec, body: Body, pushes: bool) -> None:
+    """Replace the sensors of a spec by those of a walk, in the order of `Columns`, `feet_push` only with `pushes`."""
+    sensor, objects, field = mujoco.mjtSensor, mujoco.mjtObj, mujoco.mjtConDataField
+    count, net_force = [1 << field.mjCONDATA_FOUND.value, 0, 1], [1 << field.mjCONDATA_FORCE.value, 3, 1]
+    for own in list(spec.sensors):
+        spec.delete(own)
+    for foot in body.feet:
+        spec.add_sensor(name=foot, type=sensor.mjSENS_FRAMEPOS, objtype=objects.mjOBJ_SITE, objname=foot)
+    for leg, foot in zip(LEGS, body.feet, strict=True):
+        spec.add_sensor(name=f"{leg}_touch", type=sensor.mjSENS_TOUCH, objtype=objects.mjOBJ_SITE, objname=foot)
+    contact: Any = {"type": sensor.mjSENS_CONTACT, "objtype": objects.mjOBJ_GEOM}
+    for part in body.trunk:
+        spec.add_sensor(name=f"{part}_ground", objname=part, intprm=count, **contact)
+    root: Any = {"objtype": objects.mjOBJ_BODY, "objname": body.root}
+    spec.add_sensor(name="centre_of_mass", type=sensor.mjSENS_SUBTREECOM, **root)
+    for leg, foot in zip(LEGS, body.feet, strict=True) if pushes else ():
+        spec.add_sensor(name=f"{leg}_push", objname=foot, intprm=net_force, **contact)
+
+
 def _columns(model: mujoco.MjModel, body: Body) -> Columns:
-    """Find the joints and sensors of a model."""
-    found = {}
-    for name, group in sensor_groups(body).items():
-        columns = group.find(model) or (slice(0, 0) if group.optional else None)
-        if columns is None:
-            raise InputError(f"body {body.name!r}: its sensors {', '.join(group.names)} do not measure {name}")
-        found[name] = columns
-    joints = len(body.joints)
+    """Columns of the joints, and of the sensors that `add_sensors` adds."""
+    joints, trunk = len(body.joints), len(body.trunk)
     return Columns(
         qpos=slice(ROOT_QPOS, ROOT_QPOS + joints),
         qvel=slice(ROOT_QVEL, ROOT_QVEL + joints),
         ctrl=slice(0, joints),
         grasp=slice(joints, model.nu),
-        **found,
+        foot=slice(0, 18),
+        touch=slice(18, 24),
+        trunk=slice(24, 24 + trunk),
+        centre_of_mass=slice(24 + trunk, 27 + trunk),
+        feet_push=slice(27 + trunk, model.nsensordata),
     )
 
 

@@ -116,12 +116,6 @@ def _depth_in_bumps(conditions: Conditions, feet: np.ndarray, radius: float) -> 
     return depth
 
 
-def end_of_bumps(conditions: Conditions) -> float:
-    """Distance from O at the start to the end of rough ground [mm]."""
-    lengths = conditions.body.lengths
-    return conditions.ground_at + 2 * lengths.highest_bump + lengths.bump_spacing * (BUMPS[0] - 1)
-
-
 def _bumps(conditions: Conditions) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centres on a square grid, (bump, 2), heights drawn uniformly up to the height, and radii, (bump,) [mm]."""
     lengths = conditions.body.lengths

@@ -100,20 +100,14 @@ class HingeChains(NamedTuple):
 
 
 def kinematics(model: mujoco.MjModel, body: Body) -> ThreeHinges | HingeChains:
-    """Kinematics of a compiled body's legs, in closed form if all of them have one."""
-    chains = hinge_chains(model, body)
-    return three_hinges(model, body, chains) or chains
+    """Kinematics of a compiled body's legs, in closed form if all of them have one.
 
-
-def three_hinges(model: mujoco.MjModel, body: Body, chains: HingeChains) -> ThreeHinges | None:
-    """Return the closed form of a compiled body's legs, or None if their geometry has none.
-
-    The segments are read as if they lay along the x axes of their bodies. Random postures show whether they do, and
-    whether the angles have the same meaning: there both forms must put the feet at the same places.
+    For it the segments are read as if they lay along the x axes of their bodies. Random postures show whether they do,
+    and whether the angles have the same meaning: there both forms must put the feet at the same places.
     """
-    joints = joint_numbers(model, body)
+    chains, joints = hinge_chains(model, body), joint_numbers(model, body)
     if joints.shape[1] != 3:
-        return None
+        return chains
     coxa, femur, tibia = (model.body_pos[model.jnt_bodyid[hinge]] for hinge in joints.T)
     legs = ThreeHinges(
         coxa_position=coxa,
@@ -126,7 +120,7 @@ def three_hinges(model: mujoco.MjModel, body: Body, chains: HingeChains) -> Thre
     unique = (chains.low >= (-np.pi, -np.pi, 0.0)).all() and (chains.high <= np.pi).all()
     postures = np.random.default_rng(0).uniform(chains.low, chains.high, (SAMPLES, *joints.shape))
     distance = np.abs(legs.forward(postures) - chains.forward(postures)).max()
-    return legs if unique and distance <= SAME else None
+    return legs if unique and distance <= SAME else chains
 
 
 def hinge_chains(model: mujoco.MjModel, body: Body) -> HingeChains:
@@ -159,14 +153,6 @@ def posed(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
     data.qpos[:ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
     mujoco.mj_kinematics(model, data)
     return data
-
-
-def segments(model: mujoco.MjModel, body: Body) -> np.ndarray:
-    """Lengths of the legs' segments from hinge to hinge and to the foot, in posture home, (leg, segment) [mm]."""
-    data, joints = posed(model, model.key(body.home).qpos), joint_numbers(model, body)
-    feet = [model.site(foot).id for foot in body.feet]
-    places = np.concatenate([data.xanchor[joints], data.site_xpos[feet][:, None]], axis=1)  # (leg, joint + 1, axis)
-    return np.linalg.norm(np.diff(places, axis=1), axis=-1)
 
 
 def standing_tips(x: np.ndarray, standing_height: float, stride: Stride) -> np.ndarray:

@@ -1,7 +1,7 @@
 """From a body's MJCF to the model that walks: loading, additions, gains, ground, load and adhesion.
 
-An MJCF may lack servos, contact pairs and sensors, and may name MuJoCo's explicit integrator; these are added or
-replaced. Nothing is added to the stick insect's.
+An MJCF may lack servos and contact pairs, and may name MuJoCo's explicit integrator; these are added or replaced, and
+sensors are always hexmj's own. Nothing changes the stick insect's.
 
 Torque limit of the servos: one leg alone carries the whole weight W where its lever is longest, so it is W times that
 lever. The lever of a hinge is the length of the leg from it to the foot, times the horizontal share of its axis in
@@ -16,17 +16,15 @@ Both are rounded to the significant digits of the body's `servo`: 398728 and 1.5
 """
 
 import copy
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from hexmj.bodies.compiled import CompiledBody, SensorGroup, sensor_groups
+from hexmj.bodies.compiled import CompiledBody, add_sensors
 from hexmj.bodies.ground import lay_ground
-from hexmj.bodies.kinematics import joint_numbers, posed, segments
+from hexmj.bodies.kinematics import joint_numbers, posed
 from hexmj.bodies.validation import check_described, check_finished
 from hexmj.body import Body
 from hexmj.conditions import ROUNDING, Conditions
@@ -35,17 +33,6 @@ from hexmj.legs import LEGS
 
 HOME_TOLERANCE = 1e-3
 """Tolerance of the feet and the centre of mass in posture home, in lengths of the shortest leg."""
-
-
-class Gains(NamedTuple):
-    """Gains of the servos, the same for all joints of a body."""
-
-    torque: float
-    """Greatest torque [g mm^2/s^2]."""
-    stiffness: float
-    """Torque per angle off the target [g mm^2/s^2/rad]."""
-    damping_ratio: float
-    """1 is critical; MuJoCo computes the damping of each joint from it when it compiles."""
 
 
 def compile_body(
@@ -87,22 +74,25 @@ def gravity(body: Body) -> float:
     return -float(plain_model(body).opt.gravity[2])
 
 
-def gains(model: mujoco.MjModel, body: Body) -> Gains:
-    """The gains for a compiled body without load."""
+def gains(model: mujoco.MjModel, body: Body) -> tuple[float, float]:
+    """Gains of a compiled body without load, the same for all joints.
+
+    Returns:
+        Torque limit [g mm^2/s^2], and stiffness, torque per angle off the target [g mm^2/s^2/rad].
+    """
     servo, weight = body.servo, -body.mass * float(model.opt.gravity[2])
-    inertia = model.dof_M0[model.jnt_dofadr[joint_numbers(model, body)]]
-    lightest = inertia.min(axis=1)  # (leg,)
-    return Gains(
-        torque=_rounded(weight * longest_lever(model, body), servo.digits),
-        stiffness=_rounded(1.0 / (servo.step**2 * (1.0 / lightest).mean()), servo.digits),
-        damping_ratio=servo.damping_ratio,
-    )
+    lightest = model.dof_M0[model.jnt_dofadr[joint_numbers(model, body)]].min(axis=1)  # inertia, (leg,)
+    torque, stiffness = weight * longest_lever(model, body), 1.0 / (servo.step**2 * (1.0 / lightest).mean())
+    return float(f"{torque:.{servo.digits - 1}e}"), float(f"{stiffness:.{servo.digits - 1}e}")
 
 
 def longest_lever(model: mujoco.MjModel, body: Body) -> float:
     """The longest lever with which the weight, on one foot, can turn a joint [mm]."""
     data, joints = posed(model, model.key(body.home).qpos), joint_numbers(model, body)
-    length = np.cumsum(segments(model, body)[:, ::-1], axis=1)[:, ::-1]
+    feet = data.site_xpos[[model.site(foot).id for foot in body.feet]]
+    places = np.concatenate([data.xanchor[joints], feet[:, None]], axis=1)  # (leg, joint + 1, axis)
+    segments = np.linalg.norm(np.diff(places, axis=1), axis=-1)
+    length = np.cumsum(segments[:, ::-1], axis=1)[:, ::-1]
     horizontal = np.linalg.norm(data.xaxis[joints][..., :2], axis=-1)
     return float((length * horizontal).max())
 
@@ -125,23 +115,20 @@ def check_home(compiled: CompiledBody) -> None:
             f"body {body.name!r}: in posture {body.home!r} foot {body.feet[leg]!r} is at {tips[leg].round(3).tolist()}"
             f" mm; expected {expected[leg].tolist()}, the origin of its line at the standing height below the root"
         )
-    ahead, left, _ = _described_centre(body, body.mjcf.read_bytes())
+    ahead, left, _ = _centre_of_mass(plain_model(body), body)
+    where = f"body {body.name!r}: in posture {body.home!r} the centre of mass is"
     if compiled.conditions.centre_of_mass == 0.0 and abs(ahead) > tolerance:
-        raise InputError(
-            f"body {body.name!r}: in posture {body.home!r} the centre of mass is {ahead:.4g} mm ahead of O; expected 0,"
-            f" or Conditions(centre_of_mass={ahead:.4g}) to leave it there"
-        )
+        remedy = f"Conditions(centre_of_mass={ahead:.4g}) to leave it there"
+        raise InputError(f"{where} {ahead:.4g} mm ahead of O; expected 0, or {remedy}")
     if abs(left) > tolerance:
-        raise InputError(
-            f"body {body.name!r}: in posture {body.home!r} the centre of mass is {left:.4g} mm left of O; expected 0"
-        )
+        raise InputError(f"{where} {left:.4g} mm left of O; expected 0")
 
 
 @lru_cache(maxsize=16)
 def _plain_model(body: Body, mjcf: bytes) -> mujoco.MjModel:
     """See `plain_model`; `mjcf` holds the file's content, so that an edited file is compiled again."""
     try:
-        model = _spec(body).compile()
+        model = mujoco.MjModel.from_xml_path(str(body.mjcf))
     except ValueError as error:
         raise InputError(f"body {body.name!r}: {body.mjcf} does not compile: {' '.join(str(error).split())}") from None
     check_described(model, body)
@@ -149,24 +136,25 @@ def _plain_model(body: Body, mjcf: bytes) -> mujoco.MjModel:
 
 
 @lru_cache(maxsize=16)
-def _described_centre(body: Body, mjcf: bytes) -> np.ndarray:
-    """Centre of mass of the MJCF as it is, see `_centre_of_mass`."""
-    return _centre_of_mass(_plain_model(body, mjcf), body)
-
-
-@lru_cache(maxsize=16)
 def _compiled(conditions: Conditions, looks: bool, pushes: bool, mjcf: bytes) -> CompiledBody:
     """See `compile_body`."""
     body = conditions.body
-    plain, spec = _plain_model(body, mjcf), _spec(body)
-    spec.compiler.discardvisual = not looks
+    plain, spec = _plain_model(body, mjcf), mujoco.MjSpec.from_file(str(body.mjcf))
+    from_geoms = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    spec.compiler.discardvisual = not (looks or from_geoms)
     try:
-        _add_missing(spec, plain, body, pushes)
+        _add_missing(spec, plain, body)
+        add_sensors(spec, body, pushes)
         lay_ground(spec, conditions)
         if conditions.load:
-            _add_load(spec, body, conditions.load)
-        if conditions.grasp:
-            _add_grasp(spec, body, conditions.grasp * body.mass * gravity(body))
+            mass = conditions.load * body.mass
+            part = spec.body(body.root).add_body(name="load", mass=mass)
+            part.inertia, part.explicitinertial = 3 * [body.lengths.load_gyration**2 * mass], True
+        grasp = conditions.grasp * body.mass * gravity(body)
+        for name, foot in zip(LEGS, body.feet, strict=True) if grasp else ():
+            adhesion = spec.add_actuator(name=f"{name}_grasp", trntype=mujoco.mjtTrn.mjTRN_BODY)
+            adhesion.target, adhesion.gainprm[0] = spec.geom(foot).parent.name, grasp
+            adhesion.ctrllimited, adhesion.ctrlrange = True, [0.0, 1.0]
         model = spec.compile()
     except ValueError as error:
         raise InputError(f"body {body.name!r} cannot be compiled: {' '.join(str(error).split())}") from None
@@ -180,28 +168,13 @@ def _compiled(conditions: Conditions, looks: bool, pushes: bool, mjcf: bytes) ->
     return CompiledBody.of(model, conditions)
 
 
-def _spec(body: Body) -> mujoco.MjSpec:
-    """The spec of a body's MJCF, whose inertias do not depend on its visual geoms."""
-    spec = mujoco.MjSpec.from_file(str(body.mjcf))
-    if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
-        # Write the same inertias explicitly, so that the compiler may discard visual geoms.
-        model = spec.compile()
-        spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
-        for part in spec.bodies[1:]:
-            part.mass, part.ipos = model.body_mass[part.id], model.body_ipos[part.id]
-            part.iquat, part.inertia = model.body_iquat[part.id], model.body_inertia[part.id]
-            part.explicitinertial = True
-    return spec
-
-
-def _add_missing(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, pushes: bool) -> None:
-    """Add servos, contact pairs and sensors that the MJCF lacks; only feet and trunk touch the ground.
+def _add_missing(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body) -> None:
+    """Add servos and contact pairs that the MJCF lacks; only feet and trunk touch the ground.
 
     Args:
         spec: of the body's MJCF.
         plain: the same MJCF, compiled.
         body: its description.
-        pushes: with sensors of the forces of the feet on the ground.
     """
     if spec.option.integrator == mujoco.mjtIntegrator.mjINT_EULER:
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -212,55 +185,16 @@ def _add_missing(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body, pushes:
         if {body.ground, touching} not in paired:
             pair = spec.add_pair(name=f"{body.ground}_{touching}", geomname1=body.ground, geomname2=touching)
             pair.condim, pair.solref = 3, [2 * body.longest_step, 1.0]
-    servo_gains = gains(plain, body)
-    for servo in _servos(spec, body):
-        servo.set_to_position(kp=servo_gains.stiffness, dampratio=servo_gains.damping_ratio)
+    torque, stiffness = gains(plain, body)
+    for joint in () if spec.actuators else body.joints:
+        spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    for servo in spec.actuators:
+        servo.set_to_position(kp=stiffness, dampratio=body.servo.damping_ratio)
         servo.armature *= servo.gear[0] ** 2  # the motor's inertia at the joint
-        servo.forcerange, servo.gear = [-servo_gains.torque, servo_gains.torque], [1.0] + 5 * [0.0]
+        servo.forcerange, servo.gear = [-torque, torque], [1.0] + 5 * [0.0]
         servo.ctrlrange, servo.inheritrange = [0.0, 0.0], 1.0  # the joint's own range
         servo.forcelimited = servo.ctrllimited = True
         servo.actrange, servo.actlimited = [0.0, 0.0], False
-    for group in sensor_groups(body).values():
-        if group.find(plain) is None and (pushes or not group.optional):
-            _add_sensors(spec, group)
-
-
-def _servos(spec: mujoco.MjSpec, body: Body) -> Iterator[mujoco.MjsActuator]:
-    """The actuators of the joints; they are added if the MJCF has none."""
-    if spec.actuators:
-        yield from spec.actuators
-    else:
-        for joint in body.joints:
-            yield spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-
-
-def _add_sensors(spec: mujoco.MjSpec, group: SensorGroup) -> None:
-    taken = {sensor.name for sensor in spec.sensors}
-    for name, target in zip(group.names, group.objects, strict=True):
-        name = f"{name}_measured" if name in taken else name
-        sensor = spec.add_sensor(name=name, type=group.kind, objtype=group.object_type, objname=target)
-        if group.contact:
-            sensor.intprm[:3] = group.contact
-
-
-def _add_load(spec: mujoco.MjSpec, body: Body, load: float) -> None:
-    """Let the root carry a load, in multiples of the body's own mass."""
-    mass = load * body.mass
-    part = spec.body(body.root).add_body(name="load", mass=mass, inertia=3 * [body.lengths.load_gyration**2 * mass])
-    part.explicitinertial = True
-
-
-def _add_grasp(spec: mujoco.MjSpec, body: Body, force: float) -> None:
-    """Add adhesion to the feet, each with a force [g mm/s^2] times its actuator's 0 to 1."""
-    for name, foot in zip(LEGS, body.feet, strict=True):
-        spec.add_actuator(
-            name=f"{name}_grasp",
-            trntype=mujoco.mjtTrn.mjTRN_BODY,
-            target=spec.geom(foot).parent.name,
-            gainprm=[force] + 9 * [0.0],
-            ctrllimited=True,
-            ctrlrange=[0.0, 1.0],
-        )
 
 
 def _redistribute(model: mujoco.MjModel, conditions: Conditions) -> None:
@@ -294,8 +228,3 @@ def _centre_of_mass(model: mujoco.MjModel, body: Body) -> np.ndarray:
     data = posed(model, model.key(body.home).qpos)
     mujoco.mj_comPos(model, data)
     return data.subtree_com[model.body(body.root).id].copy()
-
-
-def _rounded(value: float, digits: int) -> float:
-    """Round to significant digits."""
-    return float(f"{value:.{digits - 1}e}")

@@ -3,12 +3,13 @@
 from collections.abc import Iterator
 from math import inf
 from operator import attrgetter
+from sys import float_info
 
 import mujoco
 import numpy as np
 
-from hexmj.bodies.kinematics import segments
-from hexmj.body import ROOT_QPOS, ROOT_QVEL, Body
+from hexmj.bodies.kinematics import hinge_chains
+from hexmj.body import ROOT_QVEL, Body
 from hexmj.errors import InputError
 
 LEG_TOLERANCE = 1.5
@@ -24,31 +25,28 @@ SOFTEST = 4.0
 """Greatest time constant of a contact, in longest steps; MuJoCo takes at least two steps, and fine steps take two of
 their own."""
 
-ROOT_DOFS, LEG_DOFS, ENDS = slice(ROOT_QVEL), slice(ROOT_QVEL, None), np.s_[:, :2]
+ALL, ROOT, LEGS, ABOVE_0 = slice(None), slice(ROOT_QVEL), slice(ROOT_QVEL, None), float_info.min
 
 RULES = (
-    ("number of equality constraints", "neq", slice(None), 0, 0),
-    ("number of tendons", "ntendon", slice(None), 0, 0),
-    ("density", "opt.density", slice(None), 0, 0),
-    ("gravcomp of a body", "body_gravcomp", slice(None), 0, 0),
-    ("damping of the root", "dof_damping", ROOT_DOFS, 0, 0),
-    ("armature of the root", "dof_armature", ROOT_DOFS, 0, 0),
-    ("damping of a leg's joint", "dof_damping", LEG_DOFS, 0, inf),
-    ("margin of a joint", "jnt_margin", slice(None), 0, 0),
-    (
-        "actuatorfrclimited of a joint, set by actuatorfrcrange or the effort in a URDF",
-        "jnt_actfrclimited",
-        slice(None),
-        0,
-        0,
-    ),
-    ("dyntype of an actuator", "actuator_dyntype", slice(None), 0, 0),
-    ("condim of a contact pair", "pair_dim", slice(None), 3, inf),
-    ("solimp of a contact pair", "pair_solimp", ENDS, 0.9, inf),
-    ("margin of a contact pair", "pair_margin", slice(None), 0, 0),
-    ("gap of a contact pair", "pair_gap", slice(None), 0, 0),
-    ("iterations", "opt.iterations", slice(None), 100, inf),
-    ("tolerance", "opt.tolerance", slice(None), 0, 1e-5),
+    ("integrator (implicit is 2, implicitfast 3)", "opt.integrator", ALL, 2, 3),
+    ("solver (CG is 1, Newton 2)", "opt.solver", ALL, 1, 2),
+    ("iterations", "opt.iterations", ALL, 100, inf),
+    ("tolerance", "opt.tolerance", ALL, 0, 1e-5),
+    ("number of equality constraints", "neq", ALL, 0, 0),
+    ("number of tendons", "ntendon", ALL, 0, 0),
+    ("density", "opt.density", ALL, 0, 0),
+    ("gravcomp of a body", "body_gravcomp", ALL, 0, 0),
+    ("damping of the root", "dof_damping", ROOT, 0, 0),
+    ("armature of the root", "dof_armature", ROOT, 0, 0),
+    ("damping of a leg's joint", "dof_damping", LEGS, 0, inf),
+    ("margin of a joint", "jnt_margin", ALL, 0, 0),
+    ("actuatorfrclimited of a joint (effort in a URDF)", "jnt_actfrclimited", ALL, 0, 0),
+    ("dyntype of an actuator", "actuator_dyntype", ALL, 0, 0),
+    ("condim of a contact pair", "pair_dim", ALL, 3, inf),
+    ("solimp of a contact pair", "pair_solimp", np.s_[:, :2], 0.9, inf),
+    ("damping ratio of a contact pair", "pair_solref", np.s_[:, 1], ABOVE_0, inf),
+    ("margin of a contact pair", "pair_margin", ALL, 0, 0),
+    ("gap of a contact pair", "pair_gap", ALL, 0, 0),
 )
 """Name in the MJCF, field of the finished model, elements that are checked, least and greatest value.
 
@@ -65,9 +63,8 @@ def check_described(model: mujoco.MjModel, body: Body) -> None:
     Raises:
         InputError: the first difference.
     """
-    for check in (_names, _joints, _sizes, _legs, _ground_and_pairs):
-        for fault in check(model, body):
-            raise InputError(f"body {body.name!r}: {fault}")
+    for faults in (_names, _joints, _sizes, _legs, _ground_and_pairs):
+        _refuse(faults(model, body), body)
 
 
 def check_finished(model: mujoco.MjModel, body: Body) -> None:
@@ -76,41 +73,40 @@ def check_finished(model: mujoco.MjModel, body: Body) -> None:
     Raises:
         InputError: the first of them.
     """
-    for fault in _finished(model, body):
+    _refuse(_finished(model, body), body)
+
+
+def _refuse(faults: Iterator[str], body: Body) -> None:
+    for fault in faults:
         raise InputError(f"body {body.name!r}: {fault}")
 
 
 def _names(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     parts = [part for leg in body.legs for part in leg.parts]
-    kinds = mujoco.mjtObj
-    for kind, count, names in (
-        (kinds.mjOBJ_BODY, model.nbody, [body.root, *body.trunk, *parts]),
-        (kinds.mjOBJ_GEOM, model.ngeom, [body.ground, *body.trunk, *body.feet]),
-        (kinds.mjOBJ_SITE, model.nsite, body.feet),
-        (kinds.mjOBJ_JOINT, model.njnt, body.joints),
-        (kinds.mjOBJ_KEY, model.nkey, [body.home]),
-        (kinds.mjOBJ_CAMERA, model.ncam, body.cameras),
-    ):
-        valid = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
+    for kind, names in {
+        "body": [body.root, *body.trunk, *parts],
+        "geom": [body.ground, *body.trunk, *body.feet],
+        "site": body.feet,
+        "key": [body.home],
+        "camera": body.cameras,
+    }.items():
         for name in names:
-            if name not in valid:
-                label = kind.name.removeprefix("mjOBJ_").lower()
-                yield f"the MJCF has no {label} {name!r}; valid names: {', '.join(filter(None, valid)) or 'none'}"
+            try:
+                getattr(model, kind)(name)
+            except KeyError as error:
+                yield f"{kind}: {error.args[0]}"
 
 
 def _joints(model: mujoco.MjModel, body: Body) -> Iterator[str]:
-    root = model.body(body.root)
-    if root.jntnum[0] != 1 or root.jntadr[0] != 0 or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
+    kinds, found = mujoco.mjtJoint, [model.joint(i).name for i in range(model.njnt)]
+    if model.njnt == 0 or model.jnt_type[0] != kinds.mjJNT_FREE or model.jnt_bodyid[0] != model.body(body.root).id:
         yield f"root {body.root!r} needs a free joint, which must be the first joint of the MJCF"
-    joints = np.array([model.joint(name).id for name in body.joints])
-    hinges = (model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited[joints] == 1)
-    if not hinges.all():
-        yield f"joint {body.joints[np.argmin(hinges)]!r} must be a hinge with a range"
-    columns = np.stack([model.jnt_qposadr[joints] - ROOT_QPOS, model.jnt_dofadr[joints] - ROOT_QVEL])
-    if (columns != np.arange(len(joints))).any() or model.njnt != len(joints) + 1:
-        found = ", ".join(model.joint(i).name or "(unnamed)" for i in range(1, model.njnt))
-        yield f"joints after the root's: {found}; expected, in this order: {', '.join(body.joints)}"
-    driven = model.actuator_trnid[:, 0].tolist() == joints.tolist()
+    if found[1:] != list(body.joints):
+        yield f"joints after the root's: {', '.join(found[1:])}; expected, in this order: {', '.join(body.joints)}"
+    hinges = (model.jnt_type == kinds.mjJNT_HINGE) & (model.jnt_limited == 1)
+    if not hinges[1:].all():
+        yield f"joint {body.joints[np.argmin(hinges[1:])]!r} must be a hinge with a range"
+    driven = model.actuator_trnid[:, 0].tolist() == list(range(1, model.njnt))
     if model.nu and not (driven and (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).all()):
         yield f"{model.nu} actuators; expected one for each joint in the order of the joints, or none"
 
@@ -124,11 +120,9 @@ def _legs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
             yield f"geom {leg.foot!r} must be a sphere around the site {leg.foot!r}"
         radii.add(float(foot.size[0]))
         chain, part = [], model.body(foot.bodyid[0])
-        if part.name not in leg.parts:
-            yield f"foot {leg.foot!r} is on body {part.name!r}; expected one of {', '.join(leg.parts)}"
         while part.id not in (0, root):
             if model.body_mass[part.id] > 0 and part.name not in (*leg.parts, *body.trunk):
-                yield f"body {part.name!r} lies between the root and {leg.foot!r}; it must be one of the leg's parts"
+                yield f"body {part.name!r} between the root and {leg.foot!r} must be one of the leg's parts"
             chain = [model.joint(part.jntadr[0] + i).name for i in range(part.jntnum[0])] + chain
             part = model.body(part.parentid[0])
         if part.id != root or tuple(chain) != leg.joints:
@@ -156,10 +150,7 @@ def _ground_and_pairs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     outside = model.body_rootid[model.geom_bodyid] != model.body(body.root).id
     outside[ground.id] = False
     for geom in np.flatnonzero(outside & (model.geom_contype | model.geom_conaffinity != 0)):
-        yield (
-            f"geom {model.geom(geom).name!r} is not part of the body and nothing touches it; expected contype ="
-            " conaffinity = 0, and obstacles by Conditions(ground=...)"
-        )
+        yield f"geom {model.geom(geom).name!r} would touch nothing; obstacles are set by Conditions(ground=...)"
 
 
 def _sizes(model: mujoco.MjModel, body: Body) -> Iterator[str]:
@@ -169,30 +160,22 @@ def _sizes(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     mass = model.body_subtreemass[model.body(body.root).id]
     if not abs(mass - body.mass) <= MASS_TOLERANCE * body.mass:
         yield f"mass = {body.mass:g} g; the MJCF's is {mass:.6g} g"
-    described, found = body.lengths.shortest_leg, segments(model, body).sum(axis=1).min()
+    described, found = body.lengths.shortest_leg, hinge_chains(model, body).length.min()
     if not 1 / LEG_TOLERANCE <= described / found <= LEG_TOLERANCE:
         factor = found / described
         yield f"shortest_leg = {described:g} mm; the MJCF's is {found:.4g} mm, try lengths.scaled({factor:.3g})"
 
 
 def _finished(model: mujoco.MjModel, body: Body) -> Iterator[str]:
-    integrators, solvers = mujoco.mjtIntegrator, mujoco.mjtSolver
-    if model.opt.integrator not in (integrators.mjINT_IMPLICITFAST, integrators.mjINT_IMPLICIT):
-        yield f"integrator = {integrators(model.opt.integrator).name}; expected implicitfast or implicit"
-    if model.opt.solver not in (solvers.mjSOL_NEWTON, solvers.mjSOL_CG):
-        yield f"solver = {solvers(model.opt.solver).name}; expected Newton or CG"
-    disabled, enabled = (model.opt.disableflags, mujoco.mjtDisableBit), (model.opt.enableflags, mujoco.mjtEnableBit)
-    for flags, kinds in (disabled, enabled):
+    for flags, kinds in (model.opt.disableflags, mujoco.mjtDisableBit), (model.opt.enableflags, mujoco.mjtEnableBit):
         for name, kind in kinds.__members__.items():
             flag = name.lower().partition("_")[2]  # empty for the number of flags
             if flag and flag not in HARMLESS and flags & kind.value:
                 yield f"flag {flag!r} is not MuJoCo's default"
-    for name, field, rows, least, greatest in RULES:
+    softest = SOFTEST * body.longest_step
+    contacts = ("time constant of a contact pair [s]", "pair_solref", np.s_[:, 0], ABOVE_0, softest)
+    for name, field, rows, least, greatest in (*RULES, contacts):
         values = np.atleast_1d(attrgetter(field)(model))[rows]
         if (bad := values[~((least <= values) & (values <= greatest))]).size:
             expected = f"{least:g}" if least == greatest else f"{least:g} to {greatest:g}"
             yield f"{name} = {bad.flat[0]:g}; expected {expected}"
-    most = SOFTEST * body.longest_step
-    for stiff, damped in model.pair_solref:
-        if not (0 < stiff <= most and damped > 0):
-            yield f"solref = {stiff:g}, {damped:g} of a contact pair; expected above 0 and at most {most:g} s, above 0"

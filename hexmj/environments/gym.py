@@ -129,7 +129,7 @@ class Frames:
     def draw(self, qpos: np.ndarray) -> np.ndarray:
         """Draw the body at some `qpos`, (height, width, 3) of uint8."""
         if self._renderer is None:
-            self._data, self._renderer = mujoco.MjData(self._model), gl.renderer(self._model, *SIZE)
+            self._data, self._renderer = mujoco.MjData(self._model), gl.Renderer(self._model, *SIZE)
             atexit.register(self.close)  # before OpenGL ends
         self._data.qpos[:] = qpos
         mujoco.mj_forward(self._model, self._data)

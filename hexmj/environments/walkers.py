@@ -136,7 +136,7 @@ class Walkers:
             return self.judge(self._take(self._ids, control))
         except Diverged as error:
             time = float(self._done[error.start] * self._task.stride.dt)
-            raise walk_error(error, "acting", time, self._task.conditions) from None
+            raise walk_error(error, "acting", time) from None
 
     def check_begun(self) -> None:
         """Raise InputError unless all insects have begun and no step or reset has failed since."""
@@ -283,16 +283,14 @@ class Alone:
                 sensors[0, k], force[0, k] = self._sensors, self._force  # places at the beginning of the step
             mujoco.mj_step1(self.model, data)
         if self._warned.any():
-            raise self._diverged(control[0], model, before[0])
+            raise self._diverged(before[0])
         sensors[0, count] = self._sensors
         feet = sensors[:, :, self._foot].reshape(1, count + 1, 6, 3)
         return Rolled(before, feet, sensors[:, :count], force, torque=nothing, after=nothing)
 
-    def _diverged(self, control: np.ndarray, model: mujoco.MjModel, state: np.ndarray) -> Diverged:
-        """Return the error, with the state before and the controls since, (step, actuator)."""
+    def _diverged(self, state: np.ndarray) -> Diverged:
+        """Return the error, with the state before."""
         kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
-        before = mujoco.MjData(model)
-        mujoco.mj_setState(model, before, state, _STATE)
-        saved = {name: getattr(before, name).copy() for name in (*STATE, "xfrc_applied")}
-        now = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep), "ctrl": control}
-        return Diverged(0, ", ".join(kinds), saved | now)
+        before = mujoco.MjData(self.model)
+        mujoco.mj_setState(self.model, before, state, _STATE)
+        return Diverged(0, ", ".join(kinds), {name: getattr(before, name).copy() for name in STATE})

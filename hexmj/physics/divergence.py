@@ -6,11 +6,10 @@ takes to tumble. A push of impulse J adds at most J / m to the speed of the cent
 faster when the insect turns over: after a push the energy of the centre of mass is bounded.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from hexmj.errors import StillThrown
 from hexmj.jitted import jitted
 from hexmj.physics.settle import Settled
 
@@ -21,20 +20,9 @@ TUMBLING = 1.5
 """Greatest energy of a root that tilts past a right angle; measured is 1.2."""
 
 
-class Explosion(NamedTuple):
-    """The first walk that exploded."""
-
-    row: int
-    """Its row."""
-    substep: int
-    """Its substep."""
-    what: str
-    """What happened."""
-
-
 def explosion(
     qpos: np.ndarray, centre: np.ndarray, valid: np.ndarray, impulse: np.ndarray, settled: Settled
-) -> Explosion | None:
+) -> tuple[int, int, str] | None:
     """Find the first walk that exploded, None if none did.
 
     Args:
@@ -43,22 +31,22 @@ def explosion(
         valid: substeps up to the fall, (n,).
         impulse: sum of all pushes so far, (n,) [g mm/s].
         settled: the starts of the walks.
+
+    Returns:
+        Its row, its substep, and what happened.
     """
     most, tumbling = most_energy(settled, impulse), TUMBLING * settled.conditions.body.lengths.shortest_leg
     top, timestep = settled.conditions.highest_ground, settled.compiled.model.opt.timestep
-    twice_g = _twice_gravity(settled)
+    twice_g = twice_gravity(settled)
     row, t = _first_odd((qpos, centre), valid, impulse != 0.0, (most, tumbling), (top, timestep, twice_g))
     if row < 0:
         return None
     if not impulse[row] and (upright := _upright(qpos[row, t])) < 0.0:
-        return Explosion(row, t, f"it tilts by {np.arccos(upright):.3g} rad, past a right angle, without a push")
+        return row, t, f"it tilts by {np.arccos(upright):.3g} rad, past a right angle, without a push"
     name, place = ("centre of mass", centre[row]) if impulse[row] else ("root", qpos[row, :, :3])
     height, speed = place[t, 2] - top, np.linalg.norm(place[t] - place[t - 1]) / timestep
-    what = (
-        f"its {name} is {height:.3g} mm above the ground and moves at {speed:.3g} mm/s; height and v^2 / 2g exceed"
-        f" {most[row]:.3g} mm"
-    )
-    return Explosion(row, t, what)
+    exceeded = f"height and v^2 / 2g exceed {most[row]:.3g} mm"
+    return row, t, f"its {name} is {height:.3g} mm above the ground and moves at {speed:.3g} mm/s; {exceeded}"
 
 
 @jitted
@@ -83,36 +71,13 @@ def _upright(qpos: Any) -> float:
     return 1.0 - 2.0 * (qpos[4] ** 2 + qpos[5] ** 2)
 
 
-def check_landed(ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, impulse: np.ndarray, settled: Settled) -> None:
-    """Check that no walk ends while its push still throws it: its root has no more energy than without a push.
-
-    Args:
-        ids: starts that have not fallen, (n,).
-        qpos: at the end, (n, position).
-        qvel: at the end, (n, velocity).
-        impulse: sum of all pushes, (n,) [g mm/s].
-        settled: the starts of the walks.
-
-    Raises:
-        StillThrown: the first start that is thrown.
-    """
-    speed, height = np.linalg.norm(qvel[:, :3], axis=1), qpos[:, 2] - settled.conditions.highest_ground
-    energy, most = height + speed**2 / _twice_gravity(settled), most_energy(settled, np.zeros(1))[0]
-    thrown = np.flatnonzero((energy > most) & (impulse != 0.0))
-    if len(thrown):
-        first = thrown[0]
-        raise StillThrown(
-            f"start {ids[first]} is still thrown by its push at the end: its root is {height[first]:.3g} mm above the"
-            f" ground and moves at {speed[first]:.3g} mm/s; expected a longer observation time or a weaker push"
-        )
-
-
 def most_energy(settled: Settled, impulse: np.ndarray) -> np.ndarray:
     """Greatest energy after a push, (n,) [g mm/s], as a height, (n,) [mm]."""
     body = settled.conditions.body
     fastest = settled.conditions.vp + np.abs(impulse) / body.mass
-    return MOST_ENERGY * body.lengths.shortest_leg + fastest**2 / _twice_gravity(settled)
+    return MOST_ENERGY * body.lengths.shortest_leg + fastest**2 / twice_gravity(settled)
 
 
-def _twice_gravity(settled: Settled) -> float:
+def twice_gravity(settled: Settled) -> float:
+    """Twice the acceleration of gravity [mm/s^2]."""
     return 2.0 * settled.compiled.weight / settled.conditions.body.mass

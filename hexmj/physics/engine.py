@@ -4,7 +4,6 @@ Another engine is another module with an `Engine` in it. While a batch steps, Mu
 clock is stopped: without the clock bodies walk 5 % faster (measured), to the same bits.
 """
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,8 +16,7 @@ from mujoco.batch import Batch
 from numba import cfunc
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.conditions import Conditions
-from hexmj.errors import InputError, SimulationError
+from hexmj.errors import SimulationError
 from hexmj.jitted import jitted
 from hexmj.rotations import lowest
 from hexmj.threads import check_memory, thread_count
@@ -38,9 +36,6 @@ CLEAR = 0.01
 INTERRUPTIBLE = 20_000
 """Steps of one body between two chances for Ctrl-C while bodies settle; a fifth of a second."""
 
-CALLBACKS = "control", "passive", "contactfilter", "sensor", "act_dyn", "act_gain", "act_bias"
-"""MuJoCo's callbacks that change the physics."""
-
 
 @dataclass(frozen=True, eq=False)
 class Rolled:
@@ -58,10 +53,6 @@ class Rolled:
     """(n, step, joint) as it acts over each step, in which the speed changes and with it the damping [g mm^2/s^2]."""
     after: np.ndarray
     """(n, step, state) after each step; `Engine.put` takes it."""
-
-
-Replayed = tuple[np.ndarray, np.ndarray]
-"""What is needed to replay some bodies: states, (n, state), and the push on the root to the left, (n,) [g mm/s^2]."""
 
 
 class Engine(Protocol):
@@ -92,11 +83,10 @@ class Diverged(Exception):
         self.start, self.kinds, self.state, self.substep = start, kinds, state, substep
 
 
-def walk_error(error: Diverged, doing: str, time: float, conditions: Conditions) -> SimulationError:
+def walk_error(error: Diverged, doing: str, time: float) -> SimulationError:
     """The error of a body that diverged while it was `doing` something, at a time [time units]."""
-    text = json.dumps(conditions.values(), default=lambda number: number.item())
     message = f"start {error.start} diverged while {doing}, at {time:.4g} time units: {error.kinds}"
-    return SimulationError(message, error.state | {"conditions": np.array(text)})
+    return SimulationError(message, error.state)
 
 
 class MujocoBatch:
@@ -163,21 +153,20 @@ class MujocoBatch:
 
         Raises:
             Diverged: see `Engine.roll`.
-            InputError: a callback is set that changes the physics.
         """
         ids = np.arange(len(control))
-        before = self.replayed(ids)
+        before = self.states(ids)
         self._batch.bind("ctrl")[:] = control
         with stepping():
             while steps > (some := max(1, INTERRUPTIBLE // len(ids))):
                 self._batch.step(nstep=some)
                 steps -= some
             self._batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
-        self._check(ids, before, control[:, np.newaxis])
+        self._check(ids, before)
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """See `Engine.roll`."""
-        model, before = self._model, self.replayed(ids)
+        model, before = self._model, self.states(ids)
         if parts > 1:
             timestep = model.opt.timestep / parts
             self._timestep[ids], self._contact[ids, :, 0] = timestep, 2 * timestep
@@ -185,34 +174,19 @@ class MujocoBatch:
         try:
             with stepping():
                 seen = self._batch.rollout(control.shape[1], control, record=record, ids=ids)
-                self._check(ids, before, control)
+                self._check(ids, before)
                 self._update(ids)  # for the feet at the end
         finally:
             if parts > 1:
                 self._timestep[ids], self._contact[ids] = model.opt.timestep, model.pair_solref
         feet = [sensors[:, :, self._foot] for sensors in (seen["sensordata"], self.sensors[ids, None])]
         places = np.concatenate(feet, axis=1).reshape(len(ids), 1 + control.shape[1], 6, 3)
-        torque = _acting(before[0], seen[STATE_BITS], seen["actuator_force"], *self._joints)
-        return Rolled(before[0], places, seen["sensordata"], seen["actuator_force"], torque, seen[STATE_BITS])
+        torque = _acting(before, seen[STATE_BITS], seen["actuator_force"], *self._joints)
+        return Rolled(before, places, seen["sensordata"], seen["actuator_force"], torque, seen[STATE_BITS])
 
-    def replayed(self, ids: np.ndarray) -> Replayed:
-        """Copy what is needed to replay some bodies, since MuJoCo resets a body that diverges."""
-        return self.states(ids), self.push[ids]
-
-    def saved(self, before: Replayed, i: int, start: int, control: np.ndarray) -> dict[str, np.ndarray]:
-        """The i-th body of `before`: its state, push, controls, (step, actuator), time step and contacts."""
-        model, applied = self._batch.get_model(start), np.zeros((self._model.nbody, 6))
-        states, push = before
-        applied[self._root, 1] = push[i]
-        state = dict(zip(STATE, np.split(states[i], self._ends), strict=True))
-        settings = {"contact": model.pair_solref[:, 0].copy(), "timestep": np.array(model.opt.timestep)}
-        return state | {"xfrc_applied": applied} | settings | {"ctrl": control}
-
-    def put_back(self, saved: dict[str, np.ndarray]) -> None:
-        """Put the only body into a state of `saved`."""
-        for name, values in zip(STATE, self._state, strict=True):
-            values[0] = saved[name]
-        self._batch.bind("xfrc_applied")[0] = saved["xfrc_applied"]
+    def named(self, state: np.ndarray) -> dict[str, np.ndarray]:
+        """The parts of a body's state, (state,), by the names in `STATE`."""
+        return dict(zip(STATE, np.split(state, self._ends), strict=True))
 
     def _update(self, ids: np.ndarray) -> None:
         """Update positions, and contacts of trunks that may touch the ground: contacts take two fifths of the time."""
@@ -224,25 +198,13 @@ class MujocoBatch:
         finally:
             self._disabled[above] = usual
 
-    def _check(self, ids: np.ndarray, before: Replayed, control: np.ndarray) -> None:
-        """Raise `Diverged` for the first body that did, with its state before and its controls since."""
+    def _check(self, ids: np.ndarray, before: np.ndarray) -> None:
+        """Raise `Diverged` for the first body that did, with its state before, of (n, state)."""
         warned = self._batch.warning
         i = _first_broken(ids, warned, self.qpos)
-        if i == len(ids):
-            return
-        start = int(ids[i])
-        kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(warned[start, :, 1])]
-        state = self.saved(before, i, start, control[i])
-        raise Diverged(start, ", ".join(kinds) or "a state that is not finite", state)
-
-
-def check_no_callbacks() -> None:
-    """Raise InputError if a callback is set that changes the physics, since no result would show it."""
-    for name in CALLBACKS:
-        if getattr(mujoco, f"get_mjcb_{name}")() is not None:
-            raise InputError(
-                f"MuJoCo's callback mjcb_{name} changes the physics; expected mujoco.set_mjcb_{name}(None)"
-            )
+        if i < len(ids):
+            kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(warned[ids[i], :, 1])]
+            raise Diverged(int(ids[i]), ", ".join(kinds) or "a state that is not finite", self.named(before[i]))
 
 
 @cfunc("float64()")
@@ -250,26 +212,17 @@ def _stopped_clock() -> float:
     return 0.0
 
 
-def _ignore(warning: str) -> None:
-    """Do not log a warning."""
-
-
 _lock, _users = Lock(), []  # the user's clock and warning callbacks, once for each thread that steps
 
 
 @contextmanager
 def stepping() -> Iterator[None]:
-    """Stop MuJoCo's clock and its log of warnings within the block; the last thread restores the user's callbacks.
-
-    Raises:
-        InputError: a callback is set that changes the physics.
-    """
-    check_no_callbacks()
+    """Stop MuJoCo's clock and its log of warnings within the block; the last thread restores the user's callbacks."""
     with _lock:
         _users.append(_users[0] if _users else (mujoco.get_mjcb_time(), mujoco.get_mju_user_warning()))
         if len(_users) == 1:
             mujoco.set_mjcb_time(_stopped_clock.ctypes)
-            mujoco.set_mju_user_warning(_users[0][1] or _ignore)
+            mujoco.set_mju_user_warning(_users[0][1] or (lambda warning: None))
     try:
         yield
     finally:

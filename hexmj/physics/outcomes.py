@@ -99,10 +99,10 @@ class OutcomesSoFar:
         self._measured_loss, self._fall = np.full(size, np.inf), np.full(size, np.inf)
         self._fall_part, self._unreachable = np.full(size, -1), np.zeros(size, dtype=int)
         self._walked, self._commanded, self._depth = np.zeros((3, size))
+        upright, (slid, contacts, saturated, shown) = np.ones(size), np.zeros((4, size))
         misses = np.zeros((size, lengths.tracking_bins + 1), dtype=np.uint32)
-        slid, contacts, saturated, shown = np.zeros((4, size))
-        never = np.full(size, np.inf)
-        self._sums = _Sums(never, np.ones(size), never.copy(), slid, contacts, saturated, shown, misses)
+        clearance, toppled = np.full((2, size), np.inf)
+        self._sums = _Sums(clearance, upright, toppled, slid, contacts, saturated, shown, misses)
         self._before = np.zeros((size, compiled.model.nsensordata))
         columns, ground = compiled.columns, -settled.conditions.standing_height
         self._body = columns.foot.start, columns.touch.start, *compiled.trunk_corners, 0.999 * compiled.torque_limits
@@ -159,18 +159,14 @@ class OutcomesSoFar:
             saturation=saturation,
             unreachable=self._unreachable,
         )
-        targets = 6.0 * sums.shown
-        if (lost := self._unreachable > MOST_UNREACHABLE * targets).any():
-            start = int(np.argmax(lost))
-            share = self._unreachable[start] / targets[start]
-            raise OutOfReach(
-                f"Start {start}: {share:.0%} of the foot targets are out of reach (limit: {MOST_UNREACHABLE:.0%})."
-            )
+        missed = self._unreachable / (6.0 * sums.shown)
+        if (missed > MOST_UNREACHABLE).any():
+            start = int(np.argmax(missed > MOST_UNREACHABLE))
+            limit = f"(limit: {MOST_UNREACHABLE:.0%})"
+            raise OutOfReach(f"Start {start}: {missed[start]:.0%} of the foot targets are out of reach {limit}.")
         for name in NUMBERS:
             if (wrong := np.isnan(getattr(found, name))).any():
-                start = int(np.argmax(wrong))
-                reason = f"its {name} is NaN" + (", since no foot has stood" if name == "slip" else "")
-                raise SimulationError(f"start {start}: {reason}")
+                raise SimulationError(f"start {int(np.argmax(wrong))}: its {name} is NaN")
         return found
 
 
@@ -190,13 +186,18 @@ class WalkSoFar(OutcomesSoFar):
         """Take in one chunk of `rollout.drive`."""
         super().add(chunk)
         columns, seen, centre = measured_walk(chunk, self._settled)
+        compiled, sensors, over = self._settled.compiled, chunk.sensors[:, columns], columns[:, None] >= chunk.valid
+        feet = sensors[..., compiled.columns.foot].reshape(*sensors.shape[:2], 6, 3)
         at = np.ix_((chunk.first + columns) // self._settled.substeps - 1, chunk.ids)
         for name in ("x", "y", "stance"):
             getattr(self.measured, name)[at] = getattr(seen, name)
-        self.height[at], self.load[at] = feet_on_ground(chunk, self._settled, columns)
-        over = (columns[:, None] >= chunk.valid)[..., None]
         self.centre_of_mass[at] = centre
-        self.qpos[at] = np.where(over, np.nan, chunk.qpos[:, columns].swapaxes(0, 1))
+        for kept, values in (
+            (self.height, -compiled.depth(feet)),
+            (self.load, chunk.load[:, columns]),
+            (self.qpos, chunk.qpos[:, columns]),
+        ):
+            kept[at] = np.where(over[..., None], np.nan, values.swapaxes(0, 1))
 
 
 def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
@@ -231,18 +232,6 @@ def measured_walk(
     time, velocity = (chunk.first + shown) // m * stride.dt, np.full(shape, np.nan)
     walk = Walk(time, velocity, x - np.array(stride.geometry.origin), y, stance, stride.geometry)
     return shown, walk, centre
-
-
-def feet_on_ground(chunk: Chunk, settled: Settled, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heights of the feet above the ground [mm] and the load of the ground on them, without adhesion [g mm/s^2].
-
-    Both are (step, n, leg), in some columns of a chunk's substeps, (step,); NaN after a fall.
-    """
-    sensors, compiled = chunk.sensors[:, columns], settled.compiled
-    feet = sensors[..., compiled.columns.foot].reshape(*sensors.shape[:2], 6, 3)
-    valid = (columns < chunk.valid[:, None])[..., None]
-    height = np.where(valid, -compiled.depth(feet), np.nan).swapaxes(0, 1)
-    return height, np.where(valid, chunk.load[:, columns], np.nan).swapaxes(0, 1)
 
 
 class EffortSoFar:

@@ -8,7 +8,6 @@ import numpy as np
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.timing import Stride, steps_within
-from hexmj.validate import numbers
 
 PUSH_LASTS = 0.025
 """Duration of a push [s]."""
@@ -33,23 +32,12 @@ def can_push(conditions: Conditions, stride: Stride, observation_time: float = n
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """A push from the side at the root for each start; it lasts `PUSH_LASTS`, to the nearest step of the plan.
-
-    Raises:
-        InputError: a value is not finite.
-    """
+    """A push from the side at the root for each start; it lasts `PUSH_LASTS`, to the nearest step of the plan."""
 
     impulse: np.ndarray
     """(start,) to the left [g mm/s]."""
     time: np.ndarray
     """(start,) at which it begins, rounded down to a step of the plan [time units]."""
-
-    def __post_init__(self) -> None:
-        for name, given in vars(self).items():
-            values = numbers(name, given)
-            if not np.isfinite(values).all():
-                raise InputError(f"{name} = {values[~np.isfinite(values)][0]}; expected finite numbers")
-            object.__setattr__(self, name, values)
 
     def begins(self, stride: Stride) -> np.ndarray:
         """(start,) steps of the plan before the push."""
@@ -63,8 +51,7 @@ class Push:
     def check_within(self, duration: float, conditions: Conditions, stride: Stride, n_starts: int) -> None:
         """Raise InputError unless there is a push for each start, within a duration [time units]."""
         if self.impulse.shape != (n_starts,) or self.time.shape != (n_starts,):
-            shapes = f"impulse {self.impulse.shape}, time {self.time.shape}"
-            raise InputError(f"push: {shapes}; expected ({n_starts},), a number for each start")
+            raise InputError(f"push: expected impulse and time of shape ({n_starts},), a number for each start")
         steps, pushed = int(steps_within(duration, stride)), self.impulse != 0.0
         lasts = steps_pushed(conditions, stride) if pushed.any() else 0
         outside = pushed & ((self.time < 0.0) | (self.begins(stride) + lasts > steps))

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
+from hexmj.bodies.ground import beyond_the_ground
 from hexmj.body import ROOT_QPOS, ROOT_QVEL
 from hexmj.conditions import ROUNDING
 from hexmj.controllers.protocol import FeedbackPlan, Plan, Sensed
-from hexmj.errors import InputError, SimulationError
+from hexmj.errors import InputError, SimulationError, StillThrown
 from hexmj.jitted import jitted
-from hexmj.physics.divergence import check_landed, explosion
+from hexmj.physics.divergence import explosion, most_energy, twice_gravity
 from hexmj.physics.engine import Diverged, MujocoBatch, walk_error
 from hexmj.physics.foot_path import Orders, OrdersFromPlan
 from hexmj.physics.pushes import Push, steps_pushed
@@ -168,7 +168,7 @@ class Rollout:
         """
         first = next(rest := iter(orders))
         self._apply_push(first)
-        before = self._batch.replayed(first.ids)
+        before = self._batch.states(first.ids)
         done, records = [first], [self._step(first)]
         for each in rest:
             records.append(self._step(each))
@@ -179,10 +179,8 @@ class Rollout:
         valid = np.where(fell, np.argmax(touching, axis=1) + 1, touching.shape[1])
         centre = whole["sensors"][:, :, self._columns.centre_of_mass]
         if odd := explosion(whole["qpos"], centre, valid, self._pushed[first.ids], self.settled):
-            control = _joined([each.control for each in done])[odd.row, : odd.substep + 1]
-            start = int(first.ids[odd.row])
-            state = self._batch.saved(before, odd.row, start, control) | {"substeps": np.array(self.settled.substeps)}
-            raise self._error(Diverged(start, odd.what, state, odd.substep), first)
+            row, substep, what = odd
+            raise self._error(Diverged(int(first.ids[row]), what, self._batch.named(before[row]), substep), first)
         self._check_ground(whole["sensors"], valid, first.ids)
         missed = _joined([each.missed for each in done]).sum(axis=2)
         unreachable = np.where(np.arange(missed.shape[1]) < valid[:, None], missed, 0).sum(axis=1)
@@ -190,8 +188,16 @@ class Rollout:
         return Chunk(plan, first.first, first.ids, **whole, valid=valid, fell=fell, unreachable=unreachable)
 
     def check_landed(self, ids: np.ndarray) -> None:
-        """Raise StillThrown if a push still throws one of these starts, (n,), which have not fallen."""
-        check_landed(ids, self._batch.qpos[ids], self._batch.qvel[ids], self._pushed[ids], self.settled)
+        """Raise StillThrown if a root of these starts, (n,), which have not fallen, moves as only pushed ones do."""
+        pushed, settled = self._pushed[ids] != 0.0, self.settled
+        speed = np.linalg.norm(self._batch.qvel[ids, :3], axis=1)
+        height = self._batch.qpos[ids, 2] - settled.conditions.highest_ground
+        energy, most = height + speed**2 / twice_gravity(settled), most_energy(settled, np.zeros(1))[0]
+        for row in np.flatnonzero(pushed & (energy > most)):
+            raise StillThrown(
+                f"start {ids[row]} is still thrown by its push at the end: its root is {height[row]:.3g} mm above the"
+                f" ground and moves at {speed[row]:.3g} mm/s; expected a longer observation time or a weaker push"
+            )
 
     def _step(self, orders: Orders) -> Shown:
         """Take the orders' substeps and record them."""
@@ -213,8 +219,6 @@ class Rollout:
     def _check_ground(self, sensors: np.ndarray, valid: np.ndarray, ids: np.ndarray) -> None:
         """Raise InputError if a walk, (n, substep, column) until it falls, leaves the ground."""
         conditions = self.settled.conditions
-        if conditions.ground not in WITH_ENDS:
-            return
         feet = sensors[:, :, self._columns.foot].reshape(len(ids), -1, 6, 3)
         beyond = beyond_the_ground(conditions, feet).any(axis=2)
         beyond &= np.arange(sensors.shape[1]) < valid[:, None]
@@ -228,7 +232,7 @@ class Rollout:
         """The user's error of a start that diverged while it carried out orders."""
         time = orders.plan.time[0] + (error.substep / self.settled.substeps - 1) * self.settled.stride.dt
         doing = f"walking at V = {orders.plan.velocity[0, error.start]:g}"
-        return walk_error(error, doing, time, self.settled.conditions)
+        return walk_error(error, doing, time)
 
     def _apply_push(self, orders: Orders) -> None:
         """Push the starts whose push acts when the orders begin."""

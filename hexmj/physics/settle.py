@@ -52,27 +52,27 @@ class Settled:
         return self.state[:, : self.compiled.model.nq]
 
 
+@dataclass(eq=False)
 class Settling:
-    """A body that comes to rest at different starts, to the same bits whatever it did before."""
+    """A body that comes to rest at different starts, to the same bits whatever it did before.
 
-    def __init__(
-        self, conditions: Conditions, stride: Stride, threads: int | None = None, *, pushes: bool = False
-    ) -> None:
-        """Compile the body.
+    Raises:
+        InputError: posture home is not as described.
+    """
 
-        Args:
-            conditions: of the walk.
-            stride: of the plan.
-            threads: one per core unless given.
-            pushes: measure the forces of the feet on the ground.
+    conditions: Conditions
+    """Of the walk."""
+    stride: Stride
+    """Of the plan."""
+    threads: int | None = None
+    """One per core unless given."""
+    pushes: bool = False
+    """Measure the forces of the feet on the ground."""
 
-        Raises:
-            InputError: posture home is not as described.
-        """
-        self._conditions, self._stride, self._threads = conditions, stride, threads
-        self._compiled = compile_body(conditions, conditions.timestep(stride), looks=False, pushes=pushes)
+    def __post_init__(self) -> None:
+        timestep = self.conditions.timestep(self.stride)
+        self._compiled = compile_body(self.conditions, timestep, looks=False, pushes=self.pushes)
         check_home(self._compiled)
-        self._substeps = conditions.substeps(stride)
         self._batch: MujocoBatch | None = None
 
     def at(self, starts: ArrayLike, names: np.ndarray | None = None) -> Settled:
@@ -85,7 +85,7 @@ class Settling:
         Raises:
             InputError, SimulationError: see `settle`.
         """
-        conditions, stride, compiled = self._conditions, self._stride, self._compiled
+        conditions, stride, compiled, batch = self.conditions, self.stride, self._compiled, self._batch
         x = checked_starts(starts, stride)
         names = np.arange(len(x)) if names is None else names
         model, columns, height = compiled.model, compiled.columns, conditions.standing_height
@@ -97,7 +97,10 @@ class Settling:
                 f"start {names[start]}, leg {leg + 1}: the tip at {x[start, leg]:.3g} mm is out of reach"
                 f" at a standing height of {height:g} mm"
             )
-        batch = self._initial_batch(len(x))
+        if batch and len(batch.qpos) == len(x):
+            batch.reset()
+        else:
+            batch = self._batch = MujocoBatch(compiled, len(x), self.threads)
         batch.qpos[:, :ROOT_QPOS] = (0.0, 0.0, height + compiled.foot_radius, 1.0, 0.0, 0.0, 0.0)
         batch.qpos[:, columns.qpos] = joints.reshape(len(x), -1)
         ctrl = np.ones((len(x), model.nu))
@@ -106,24 +109,14 @@ class Settling:
             batch.rest(ctrl, max(1, round(conditions.settling_time / 1000.0 / model.opt.timestep)))
         except Diverged as error:
             error.start = int(names[error.start])
-            raise walk_error(error, "settling", 0.0, conditions) from None
+            raise walk_error(error, "settling", 0.0) from None
         if conditions.grasp:
             _check_grasp(batch.sensors[:, columns.foot], compiled)
         load = compiled.carried(batch.sensors, batch.force)
         _check_rest(batch, load, names, compiled)
         torques = batch.force[:, columns.ctrl].copy()
-        return Settled(
-            x, tips, batch.states(np.arange(len(x))), ctrl, load, torques, compiled, conditions, stride, self._substeps
-        )
-
-    def _initial_batch(self, count: int) -> MujocoBatch:
-        """Bodies in their initial state; the last batch is used again if it has as many."""
-        batch = self._batch
-        if batch and len(batch.qpos) == count:
-            batch.reset()
-        else:
-            batch = self._batch = MujocoBatch(self._compiled, count, self._threads)
-        return batch
+        state, substeps = batch.states(np.arange(len(x))), conditions.substeps(stride)
+        return Settled(x, tips, state, ctrl, load, torques, compiled, conditions, stride, substeps)
 
 
 def settle(

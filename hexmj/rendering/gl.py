@@ -14,22 +14,21 @@ PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
 class Renderer(mujoco.Renderer):
     """MuJoCo's renderer, which frees its textures in its own OpenGL context, not in the last one used."""
 
+    def __init__(self, model: mujoco.MjModel, height: int, width: int) -> None:
+        """Prepare frames of height x width pixels.
+
+        Raises:
+            RenderingError: nothing can be rendered on this machine.
+        """
+        if reason := missing():
+            raise RenderingError(reason)
+        super().__init__(model, height, width)
+
     def close(self) -> None:
         """Free the renderer; it may be called again."""
         if self._gl_context:
             self._gl_context.make_current()
         super().close()
-
-
-def renderer(model: mujoco.MjModel, height: int, width: int) -> Renderer:
-    """Return a renderer for frames of height x width pixels.
-
-    Raises:
-        RenderingError: nothing can be rendered on this machine.
-    """
-    if reason := missing():
-        raise RenderingError(reason)
-    return Renderer(model, height, width)
 
 
 def missing() -> str | None:
@@ -38,12 +37,12 @@ def missing() -> str | None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # GLFW only warns if there is no display, and makes no context
             context = mujoco.GLContext(16, 16)
-        reason = "" if context._context else "no display"
-        context.free()
+        if context._context:
+            context.free()
+            return None
+        reason = "no display"
     except Exception as error:  # OpenGL libraries and drivers raise errors of their own types
         reason = textwrap.shorten(str(error) or type(error).__name__, 160, placeholder=" [...]").rstrip(".")
-    if not reason:
-        return None
     return (
         f"Nothing can be rendered here ({reason}). Without a display, set MUJOCO_GL=egl; on Debian and Ubuntu it needs"
         f" the packages {PACKAGES}."

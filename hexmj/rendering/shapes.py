@@ -39,9 +39,10 @@ class Shape(NamedTuple):
     """(corner,) number of the body."""
 
 
-def body_shape(model: mujoco.MjModel) -> Shape:
-    """Return the shape of all moving bodies."""
-    return joined(geom_shape(model, i) for i in range(model.ngeom) if model.geom_bodyid[i] and _visible(model, i))
+def body_shapes(model: mujoco.MjModel) -> list[Shape]:
+    """Return the shapes of the visible geoms of all moving bodies."""
+    shown = (model.geom_bodyid > 0) & (model.geom_group < VISIBLE_GROUPS)
+    return [geom_shape(model, geom) for geom in np.flatnonzero(shown).tolist() if _rgba(model, geom)[3] > 0]
 
 
 def ground_shape(compiled: CompiledBody) -> Shape:
@@ -94,10 +95,6 @@ def _surface(places: np.ndarray, height: np.ndarray) -> Shape:
     faces = faces[(height.ravel()[faces] > 0).any(axis=1)]
     unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return Shape(corners, unit, faces, np.zeros_like(corners), np.zeros(len(corners), int))
-
-
-def _visible(model: mujoco.MjModel, geom: int) -> bool:
-    return bool(model.geom_group[geom] < VISIBLE_GROUPS and _rgba(model, geom)[3] > 0)
 
 
 def _rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:

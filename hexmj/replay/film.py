@@ -1,16 +1,13 @@
-"""Settings of a film, and the encoder that writes its frames to an MP4 or GIF file."""
+"""Settings of a film, and the encoding of its frames as an MP4 or GIF file."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from hexmj.body import Body
-from hexmj.errors import InputError, RenderingError, without_extra
+from hexmj.errors import InputError, RenderingError
 from hexmj.validate import choice, number, whole
 
 MOST_PANELS = 6
@@ -61,26 +58,13 @@ class Film:
         if name == "gif" and self.fps > FASTEST_GIF:
             raise InputError(f"fps = {self.fps:g}; a GIF has at most {FASTEST_GIF} frames per second")
 
-    def check_camera(self, body: Body) -> None:
-        """Raise InputError if a body does not have the camera."""
-        choice("camera", self.camera, body.cameras)
 
-
-def missing_encoder() -> str | None:
-    """Return what to install before films can be encoded, or None."""
-    if find_spec("imageio_ffmpeg") and find_spec("mediapy"):
-        return None
-    return str(without_extra("film", "mediapy or imageio-ffmpeg"))
-
-
-@contextmanager
-def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callable[[np.ndarray], None]]:
-    """Provide a function that adds a frame, (height, width, 3) of bytes, to a new film.
+def write_film(path: Path, frames: Iterable[np.ndarray], fps: float) -> None:
+    """Encode frames, (height, width, 3) of bytes each, of even height and width, as a new film.
 
     Args:
         path: of the film, with a suffix of `ENCODINGS`.
-        height: of a frame, even [pixels].
-        width: of a frame, even [pixels].
+        frames: in their order.
         fps: frames per second.
 
     Raises:
@@ -89,22 +73,8 @@ def encoder(path: Path, height: int, width: int, fps: float) -> Iterator[Callabl
     import imageio_ffmpeg
     import mediapy
 
-    writer = mediapy.VideoWriter(path.absolute(), (height, width), fps=fps, **ENCODINGS[path.suffix])
     try:
         mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-        writer.__enter__()
+        mediapy.write_video(path.absolute(), frames, fps=fps, **ENCODINGS[path.suffix])
     except (OSError, RuntimeError) as error:
-        raise RenderingError(f"ffmpeg cannot be run: {error}. Reinstall imageio-ffmpeg.") from None
-    try:
-        with suppress(BrokenPipeError):  # ffmpeg ended early; `close` raises its reason
-            yield writer.add_image
-    except BaseException:
-        with suppress(OSError, RuntimeError):
-            writer.close()
-        raise
-    try:
-        with suppress(BrokenPipeError):  # the second call raises the reason
-            writer.close()
-        writer.close()
-    except RuntimeError as error:
         raise RenderingError(f"ffmpeg failed: {' '.join(str(error).split()):.300}") from None

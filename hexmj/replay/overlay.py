@@ -5,6 +5,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from PIL import Image, ImageDraw, ImageFont
 
 from hexmj.legs import LEGS
@@ -60,7 +61,9 @@ class Overlay:
         image, font, edge = Image.fromarray(background), _font(self._pixels(11)), self._pixels(10)
         draw, middle = ImageDraw.Draw(image), image.height // 2
         if scale > 0:
-            length = _round(self._pixels(BAR) / scale)
+            longest = self._pixels(BAR) / scale
+            power = 10.0 ** np.floor(np.log10(longest))
+            length = max(float(power * part) for part in (1, 2, 5) if power * part <= longest)
             end = edge + round(length * scale)
             draw.line((edge, middle, end, middle), INK, self._pixels(1.5))
             for x in (edge, end):
@@ -106,9 +109,9 @@ class Overlay:
     def _outside(self, seconds: float) -> str:
         """Return a text for times before or after the recording, as beside a longer one; otherwise ""."""
         take = self._take
-        if seconds < take.begin - take.step / 2:
-            return f"recorded from {1000 * take.begin:.0f} ms"
-        return f"recorded until {1000 * take.end:.0f} ms" if seconds > take.end + take.step / 2 else ""
+        if take.begin - take.step / 2 <= seconds <= take.end + take.step / 2:
+            return ""
+        return f"recorded from {1000 * take.begin:.0f} to {1000 * take.end:.0f} ms"
 
     def _axes(self, width: int, height: int) -> np.ndarray:
         """Return the diagram without bars, (height, width, 3)."""
@@ -119,8 +122,10 @@ class Overlay:
             draw.line((self._left, self._row(leg + 1), self._right, self._row(leg + 1)), SHADE)
         baseline = (self._row(6) + height) / 2
         draw.text((label, baseline), "ms", FAINT, font, anchor="rm")
-        for milliseconds in _ticks(1000 * self._begin, 1000 * self._end):
+        for milliseconds in MaxNLocator(11, steps=(1, 2, 5, 10)).tick_values(1000 * self._begin, 1000 * self._end):
             x = self._column(milliseconds / 1000)
+            if not self._left <= x <= self._right:
+                continue
             draw.line((x, self._row(6), x, self._row(6) + self._pixels(2)), FAINT)
             half = draw.textlength(f"{milliseconds:g}", font) / 2
             if label < x - half and x + half < width:
@@ -166,20 +171,6 @@ def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:
     while text and font.getlength(f"{text}…") > width:
         text = text[:-1]
     return f"{text}…"
-
-
-def _round(most: float) -> float:
-    """Return the greatest of 1, 2, 5, 10, 20 ... (and 0.5, 0.2 ...) that is not above `most`."""
-    power = 10.0 ** np.floor(np.log10(most))
-    return max(float(power * part) for part in (1, 2, 5) if power * part <= most)
-
-
-def _ticks(begin: float, end: float) -> np.ndarray:
-    """Return round numbers from `begin` to `end`, five to twelve of them."""
-    span = end - begin
-    power = 10.0 ** np.floor(np.log10(span))
-    step = next(power * part for part in (0.1, 0.2, 0.5, 1.0) if span <= 11 * power * part)
-    return np.arange(np.ceil(begin / step - 1e-9) * step + 0.0, end + 1e-9 * span, step)  # + 0.0: never -0
 
 
 @cache

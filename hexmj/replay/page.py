@@ -17,7 +17,7 @@ from hexmj.conditions import Conditions, unusual
 from hexmj.errors import InputError
 from hexmj.files import write_text
 from hexmj.legs import LEGS
-from hexmj.rendering.shapes import body_shape, ground_shape
+from hexmj.rendering.shapes import body_shapes, ground_shape, joined
 from hexmj.replay.take import Take, takes_of
 
 MOST_RECORDINGS = 2
@@ -61,11 +61,12 @@ def page_text(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> st
     """Return the page of one or two recordings as a text, see `page`."""
     takes = takes_of(recordings, body, MOST_RECORDINGS)
     data = [_page_data(recording, take) for recording, take in zip(recordings, takes, strict=True)]
-    parts = {"STYLE": _asset("page.css"), "SCRIPT": _asset("page.js"), "RECORDINGS": _script_json(data)}
+    escapes = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}  # neither end the script nor begin a comment
+    recordings_json = json.dumps(data, allow_nan=False).translate(str.maketrans(escapes))
+    parts = {"STYLE": _asset("page.css"), "SCRIPT": _asset("page.js"), "RECORDINGS": recordings_json}
     text = _asset("page.html")
     for name, part in parts.items():
-        before, after = text.split(f"<!--{name}-->")
-        text = before + part + after
+        text = text.replace(f"<!--{name}-->", part)
     return text
 
 
@@ -101,7 +102,7 @@ def _page_data(recording: xr.Dataset, take: Take) -> dict[str, Any]:
         "centre_of_mass": _packed(take.centre_of_mass[rows], "f4"),
         "polygon": _packed(padded, "f4"),
         "level": _packed(levels, "f4"),
-        "body": _packed_parts(body_shape(model), SHAPE),
+        "body": _packed_parts(joined(body_shapes(model)), SHAPE),
         "ground": _packed_parts(ground_shape(compiled), SHAPE),
     } | (_packed_parts(recording, MEASURED) if take.physical else {})
 
@@ -139,12 +140,6 @@ def _packed(values: Any, kind: str) -> dict[str, Any]:
 
 def _packed_parts(source: Any, kinds: dict[str, str]) -> dict[str, Any]:
     return {name: _packed(getattr(source, name), kind) for name, kind in kinds.items()}
-
-
-def _script_json(value: object) -> str:
-    """Return JSON that neither ends a script of HTML nor begins a comment."""
-    escapes = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}
-    return json.dumps(value, allow_nan=False).translate(str.maketrans(escapes))
 
 
 def _asset(name: str) -> str:

@@ -1,5 +1,6 @@
 """Recordings: one start of a walk as a file, with everything that figures, films and pages need."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -85,30 +86,22 @@ class Start:
     acceleration: Acceleration | None = None
     conditions: Conditions = Conditions()
 
-    @property
-    def how(self) -> dict[str, Any]:
-        """Stride and acceleration, as arguments of walks."""
-        return {"stride": self.stride, "acceleration": self.acceleration}
-
-    @property
-    def drawn(self) -> Any:
-        """The start, (1, leg) [mm], the controller, the velocity and the duration [time units]."""
-        time = observation_duration(self.observation_time, self.velocity, self.stride, self.acceleration)
-        return draw_start(self.start, self.seed, self.stride), self.controller, self.velocity, float(time)
-
     def walked(self, threads: int | None = None) -> PhysicalWalk:
         """Return the physical walk."""
         with progress_bar("walking") as progress:
-            how: Any = self.how | {"conditions": self.conditions, "progress": progress, "threads": threads}
-            return physical_walk(*self.drawn, **how)
+            return self._call(physical_walk, conditions=self.conditions, progress=progress, threads=threads)
 
     def recorded(self, physical: bool, title: str, threads: int | None = None) -> xr.Dataset:
         """Return a recording of the physical walk, or of the plan."""
         if physical:
             return record(self.walked(threads), title=title)
-        return record_plan(
-            planned_walk(*self.drawn, **self.how, threads=threads), self.conditions, self.stride, title=title
-        )
+        return record_plan(self._call(planned_walk, threads=threads), self.conditions, self.stride, title=title)
+
+    def _call(self, walk: Callable[..., Any], **options: Any) -> Any:
+        """Call a measure of walks with the start, controller, velocity, duration, stride and acceleration."""
+        time = observation_duration(self.observation_time, self.velocity, self.stride, self.acceleration)
+        start, options = draw_start(self.start, self.seed, self.stride), {"stride": self.stride} | options
+        return walk(start, self.controller, self.velocity, float(time), acceleration=self.acceleration, **options)
 
     def settings(self, **controllers: Controller) -> dict[str, Any]:
         """Return what is needed to repeat the walk, as plain data."""
@@ -172,12 +165,9 @@ def record_plan(
         The variables of `PLANNED`, with the title, the conditions and the stride as attributes.
 
     Raises:
-        InputError: the plan has another geometry than the stride, does not begin with its first step, or a leg cannot
-            reach its tip at time 0.
+        InputError: the plan does not begin with its first step, or a leg cannot reach its tip at time 0.
     """
     planned = one_start(plan, start)
-    if plan.geometry != stride.geometry:
-        raise InputError(f"plan has the geometry {plan.geometry}; expected that of the stride, {stride.geometry}")
     steps = len(plan.time)
     if steps == 0 or not np.allclose(plan.time, np.arange(1, steps + 1) * stride.dt, 1e-9, 0.0):
         raise InputError(f"plan has {steps} steps that do not begin at time 0; expected multiples of {stride.dt}")

@@ -1,8 +1,9 @@
 """Films of recordings: the body, its support polygon, a caption and a footfall diagram."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from importlib.util import find_spec
 from pathlib import Path
 
 import mujoco
@@ -12,14 +13,15 @@ import xarray as xr
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
-from hexmj.errors import InputError, RenderingError
+from hexmj.errors import InputError, RenderingError, without_extra
 from hexmj.files import replacing
 from hexmj.progress import Progress, shown
 from hexmj.rendering import gl
 from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
-from hexmj.replay.film import ENCODINGS, MOST_PANELS, Film, encoder, missing_encoder
+from hexmj.replay.film import ENCODINGS, MOST_PANELS, Film, write_film
 from hexmj.replay.overlay import Overlay
 from hexmj.replay.take import Take, takes_of
+from hexmj.validate import choice
 
 BRIGHTER = 1.2
 """Factor of the ground's colour in films without shadows, which MuJoCo lights less."""
@@ -58,7 +60,7 @@ def render(
     film, path = film or Film(), Path(path)
     if path.suffix not in ENCODINGS:
         raise InputError(f"path = {path}; expected a name with {' or '.join(ENCODINGS)}")
-    film.check_camera(body)
+    choice("camera", film.camera, body.cameras)
     film.check_format(path.suffix.removeprefix("."))
     takes = takes_of(recordings, body, MOST_PANELS)
     if reason := missing():
@@ -68,52 +70,47 @@ def render(
     times = begin + np.arange(frames) / (film.fps * film.slow_motion)
     overlays = [Overlay(take, film, begin, end) for take in takes]
     with shown(progress, "rendering") as advance, replacing(path) as part:
-        _write(takes, overlays, part, times, film, advance)
+        write_film(part, _frames(takes, overlays, times, film, advance), film.fps)
     return frames
 
 
 def missing() -> str | None:
     """Return why no film can be made on this machine and what to install, or None."""
-    return gl.missing() or missing_encoder()
+    encoder = find_spec("imageio_ffmpeg") and find_spec("mediapy")
+    return gl.missing() or (None if encoder else str(without_extra("film", "mediapy or imageio-ffmpeg")))
 
 
-def _write(
-    takes: Sequence[Take],
-    overlays: Sequence[Overlay],
-    path: Path,
-    times: np.ndarray,
-    film: Film,
-    progress: Progress | None,
-) -> None:
-    """Film takes side by side at times on their clock, (frame,) [s]. A second thread draws overlays and encodes."""
+def _frames(
+    takes: Sequence[Take], overlays: Sequence[Overlay], times: np.ndarray, film: Film, progress: Progress | None
+) -> Iterator[np.ndarray]:
+    """Yield frames of takes side by side at times on their clock, (frame,) [s]; a second thread draws the overlays."""
     rows = 1 if len(takes) <= IN_A_ROW else 2
     columns = -(-len(takes) // rows)
     picture = np.full((film.height * rows, film.width * columns, 3), 255, dtype=np.uint8)
     panels = [panel for row in np.split(picture, rows) for panel in np.split(row, columns, axis=1)][: len(takes)]
+
+    def drawn(views: Sequence[tuple[np.ndarray, float]], seconds: float) -> np.ndarray:
+        for take, overlay, panel, (view, scale) in zip(takes, overlays, panels, views, strict=True):
+            panel[:] = view
+            overlay.draw(panel, take.row(seconds), seconds, scale)
+        return picture
+
     with ExitStack() as opened:
         stages: dict[Conditions, tuple[gl.Renderer, mujoco.MjData]] = {}
         for conditions in dict.fromkeys(take.conditions for take in takes):
             model = _filmed_body(film, conditions)
-            renderer = opened.enter_context(gl.renderer(model, film.height, film.width))
+            renderer = opened.enter_context(gl.Renderer(model, film.height, film.width))
             stages[conditions] = renderer, mujoco.MjData(model)
-        height, width, _ = picture.shape
-        add = opened.enter_context(encoder(path, height, width, film.fps))
-        finishing = opened.enter_context(ThreadPoolExecutor(1))
-
-        def finish(views: Sequence[tuple[np.ndarray, float]], seconds: float) -> None:
-            for take, overlay, panel, (view, scale) in zip(takes, overlays, panels, views, strict=True):
-                panel[:] = view
-                overlay.draw(panel, take.row(seconds), seconds, scale)
-            add(picture)
-
-        finished = finishing.submit(lambda: None)
+        drawer, frame = opened.enter_context(ThreadPoolExecutor(1)), None
         for seconds in times.tolist():
             views = [_view(stages[take.conditions], film.camera, take, take.row(seconds)) for take in takes]
-            finished.result()
-            finished = finishing.submit(finish, views, seconds)
+            if frame:
+                yield frame.result()
+            frame = drawer.submit(drawn, views, seconds)
             if progress:
                 progress(1 / len(times))
-        finished.result()
+        if frame:
+            yield frame.result()
 
 
 def _filmed_body(film: Film, conditions: Conditions) -> mujoco.MjModel:

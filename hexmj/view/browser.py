@@ -19,7 +19,7 @@ from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
 from hexmj.rendering.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
-from hexmj.rendering.shapes import body_shape, ground_shape
+from hexmj.rendering.shapes import body_shapes, ground_shape
 from hexmj.replay.take import margin_in_words, support_on_ground
 from hexmj.validate import whole
 from hexmj.view.live import LiveWalk, Moment
@@ -64,8 +64,8 @@ def page_server(text: str, host: str, port: int) -> ThreadingHTTPServer:
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
-            content = text.encode() if self.path == "/" else b""
-            self.send_response(200 if content else 404)
+            content = text.encode()
+            self.send_response(200)
             self.send_header("Content-Type", "text/html; charset=utf-8")
             self.send_header("Content-Length", str(len(content)))
             self.end_headers()
@@ -192,17 +192,14 @@ class BrowserView:
         scene.add_grid(
             "/ground/plane", position=(0.0, 0.0, plane), plane_opacity=0.5, plane_color=(225, 225, 220), **grid
         )
-        ground, seen = ground_shape(compiled), body_shape(self._model)
+        ground, self._frames = ground_shape(compiled), {}
         if len(ground.faces):
             scene.add_mesh_simple("/ground/shape", ground.corners, ground.faces, color=(190, 196, 200), side="double")
-        self._frames = {}
-        for body in np.unique(seen.body):
-            name = f"/body_{body}"
-            self._frames[body] = scene.add_frame(name, show_axes=False)
-            for k, colour in enumerate(np.unique(seen.colour[seen.body == body], axis=0)):
-                part = (seen.body == body) & (seen.colour == colour).all(axis=1)
-                faces = np.cumsum(part)[seen.faces[part[seen.faces].all(axis=1)]] - 1
-                scene.add_mesh_simple(f"{name}/part_{k}", seen.corners[part], faces, color=tuple(colour), side="double")
+        for n, part in enumerate(body_shapes(self._model)):
+            body, colour = int(part.body[0]), tuple(part.colour[0].tolist())
+            if body not in self._frames:
+                self._frames[body] = scene.add_frame(f"/body_{body}", show_axes=False)
+            scene.add_mesh_simple(f"/body_{body}/part_{n}", part.corners, part.faces, color=colour, side="double")
         self._add_marks(conditions.body.marks)
 
     def _add_marks(self, marks: Any) -> None:
@@ -267,7 +264,7 @@ class BrowserView:
         sign = "\N{HEAVY CHECK MARK}" if stable and not walk.fell_on else "\N{HEAVY MULTIPLICATION X}"
         self._readout.content = (
             f"**{margin_in_words(moment.margin)}** {sign} {state}\n\nV = {moment.velocity:.2f}, {moment.seconds:.2f} s,"
-            f" start {session.start}; {session.factor:.2f} times real time\n\n_{session.message}_"
+            f" start {session.start}\n\n_{session.message}_"
         ).removesuffix("\n\n__")
         if len(self._recent) < 2:
             return

@@ -3,7 +3,7 @@
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import takewhile
 from queue import SimpleQueue
@@ -35,29 +35,37 @@ def screen() -> bool:
 
 def view_live(session: LiveSession) -> None:
     """Show a live walk until the window is closed."""
-    walk, keys = session.walk, SimpleQueue[int]()
-    with _window(walk.conditions, keys.put) as window:
-        for passed in takewhile(lambda _: window.is_running(), ticks()):
-            while not keys.empty():
-                session.attempt(partial(_press, session, keys.get()))
-            moment = session.tick(passed)
-            seen = moment.feet[:, :2], moment.stance, moment.centre_of_mass, moment.planned_tips
-            state = f"fell on {walk.fell_on}" if walk.fell_on else margin_in_words(moment.margin)
-            text = f"V = {walk.velocity:.2f}, {state}"
-            _show(window, walk.conditions, moment.qpos, moment.margin, seen, text, session.message)
+    walk = session.walk
+    for window, passed in _opened(walk.conditions, lambda key: session.attempt(partial(_press, session, key))):
+        moment = session.tick(passed)
+        seen = moment.feet[:, :2], moment.stance, moment.centre_of_mass, moment.planned_tips
+        state = f"fell on {walk.fell_on}" if walk.fell_on else margin_in_words(moment.margin)
+        text = f"V = {walk.velocity:.2f}, {state}"
+        _show(window, walk.conditions, moment.qpos, moment.margin, seen, text, session.message)
 
 
 def view_recording(session: ReplaySession) -> None:
     """Show a recording until the window is closed."""
-    take, keys = session.take, SimpleQueue[int]()
-    with _window(take.conditions, keys.put) as window:
+    take = session.take
+
+    def pause(key: int) -> None:
+        session.paused ^= key == SPACE
+
+    for window, passed in _opened(take.conditions, pause):
+        row = session.tick(passed)
+        seen = take.feet[row], take.stance[row], take.centre_of_mass[row], take.planned_tip[row]
+        text = f"{take.title}, half speed, {margin_in_words(take.margin[row])}"
+        _show(window, take.conditions, take.qpos[row], take.margin[row], seen, text)
+
+
+def _opened(conditions: Conditions, press: Callable[[int], object]) -> Iterator[tuple[Any, float]]:
+    """Yield a window and the time since the last frame [s] until it is closed; `press` receives the pressed keys."""
+    keys = SimpleQueue[int]()
+    with _window(conditions, keys.put) as window:
         for passed in takewhile(lambda _: window.is_running(), ticks()):
             while not keys.empty():
-                session.paused ^= keys.get() == SPACE
-            row = session.tick(passed)
-            seen = take.feet[row], take.stance[row], take.centre_of_mass[row], take.planned_tip[row]
-            text = f"{take.title}, half speed, {margin_in_words(take.margin[row])}"
-            _show(window, take.conditions, take.qpos[row], take.margin[row], seen, text)
+                press(keys.get())
+            yield window, passed
 
 
 def _press(session: LiveSession, key: int) -> None:

@@ -25,9 +25,6 @@ from hexmj.walks import PlannedWalk, joined, part_of
 ONLY = np.array([0])
 """The index of the only insect."""
 
-LONGEST_ADVANCE = 60.0
-"""Longest time of one call of `LiveWalk.advance` [s]."""
-
 STRONGEST_PUSH = 80.0
 """Strongest push, as of `hexmj disturb` [body mass times V_p]."""
 
@@ -174,7 +171,6 @@ class LiveWalk:
         """
         velocity = self.velocity if velocity is None else number("velocity", velocity)
         controller = self.controller if controller is None else controller
-        begin(controller, self.start[np.newaxis], velocity, self.stride, threads=1)  # raises for bad values
         before, self.velocity, self.controller = (self.velocity, self.controller), velocity, controller
         try:
             if self._plan.hand_over(controller, velocity):
@@ -209,7 +205,7 @@ class LiveWalk:
             InputError: a bad time, more than `MOST_STEPS` in all, the end of the ground, or a failing controller.
             SimulationError: the simulation diverged.
         """
-        self._time_left += number("seconds", seconds, 0.0, LONGEST_ADVANCE)
+        self._time_left += number("seconds", seconds, 0.0, 60.0)
         self.trace = []
         step = self.conditions.seconds(self.stride)
         steps = int(self._time_left / step + 1e-9)

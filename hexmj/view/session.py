@@ -1,7 +1,6 @@
 """A live walk or a recording in real time, for every viewer."""
 
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -20,9 +19,6 @@ IMPULSE = 8.0
 
 LYING_TIME = 1.5
 """Time between a fall and the next start [s]."""
-
-RECENT = 60
-"""Frames over which the real-time factor is measured."""
 
 
 def ticks() -> Iterator[float]:
@@ -49,24 +45,15 @@ class LiveSession:
         """Show a walk from start number `start`; `starts` returns a start, (leg,) [mm], by its number."""
         self.walk, self.start, self.paused, self.message = walk, start, False, ""
         self._starts, self._tried, self._lying = starts, start, 0.0
-        self._recent: deque[tuple[float, float]] = deque(maxlen=RECENT)
-
-    @property
-    def factor(self) -> float:
-        """Simulated time over real time of the recent frames."""
-        real = sum(passed for passed, _ in self._recent)
-        return sum(walked for _, walked in self._recent) / real if real else 1.0
 
     def tick(self, passed: float) -> Moment:
         """Advance by a time [s]."""
         self.walk.trace = []
         if self.paused:
             return self.walk.moment
-        before = self.walk.moment.seconds
         if not self.walk.fell_on:
             if not self._done(lambda: self.walk.advance(min(passed, LONGEST_STEP))):
                 self._done(self.begin)
-            self._recent.append((passed, max(0.0, self.walk.moment.seconds - before)))
         elif (lying := self._lying + passed) < LYING_TIME:
             self._lying = lying
         else:
@@ -90,7 +77,6 @@ class LiveSession:
         self._tried, self._lying = start, 0.0
         self.walk.begin(self._starts(start))
         self.start = start
-        self._recent.clear()
 
     def _done(self, change: Callable[[], object]) -> bool:
         try:
