@@ -1,23 +1,20 @@
 """The measures of stability on the same starts: planned polygon, measured polygon, and falls."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.planning import check_velocities
-from hexmj.controllers.protocol import Controller, settings_of
-from hexmj.io import attributes
+from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Controller
 from hexmj.legs import LEGS
 from hexmj.measures import tables
-from hexmj.measures.cells import WalkSettings, outcome_table
-from hexmj.starts import check_draw, draw_starts
+from hexmj.measures.study import Study, outcome_table
+from hexmj.starts import draw_starts
 from hexmj.sweep import Cell, Execution, over_axes, run_study
 from hexmj.timing import Acceleration, Stride
-from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,44 +33,25 @@ REPORTED = ("clearance", "tilt", "speed", "slip", "tracking", "depth", "saturati
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Study):
     """Controllers on the same starts at every velocity, with a cell for each controller and velocity."""
 
     controllers: Mapping[str, Controller]
     """Controllers by their names in the result."""
     velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
     """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
-    n_starts: int = 60
-    """Number of random starts, the same for every controller and velocity."""
     observation_time: str | float = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
-    seed: int = 0
-    """Seed of the random starts."""
-    conditions: Conditions = Conditions()
-    stride: Stride = Stride()
     acceleration: Acceleration | None = None
     """The accelerating procedure of Eq. 11."""
-
-    def __post_init__(self) -> None:
-        distinct("controllers", list(self.controllers))
-        for controller in self.controllers.values():
-            settings_of(controller)  # raises before the work, not after it
-        check_draw(self.n_starts, self.seed)
-        check_ground(self.conditions)
-        _ = self.observed
-
-    @property
-    def observed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Velocities and observation times [time units], both (velocity,)."""
-        return tables.observed(self.velocities, self.observation_time, self.stride, self.acceleration)
+    n_starts: int = field(default=60, kw_only=True)
+    """Number of random starts, the same for every controller and velocity."""
 
     def cells(self) -> list[Cell]:
         """Return the cells, each an `outcome_table`."""
-        for controller in self.controllers.values():
-            check_velocities(controller, self.velocities, self.stride, self.acceleration)
-        same = self.n_starts, self.seed, self.conditions, self.stride, self.acceleration
+        self.check_walks(self.velocities)
         return [
-            Cell(f"{name}-V-{v:g}", outcome_table, {"walks": WalkSettings(controller, v, t, *same)}, work=t)
+            Cell(f"{name}-V-{v:g}", outcome_table, {"walks": self.walks(v, t, self.conditions, controller)}, work=t)
             for name, controller in self.controllers.items()
             for v, t in zip(*self.observed, strict=True)
         ]
@@ -92,13 +70,7 @@ class Comparison:
         table = with_flss(table, MEASURES | BESIDE)
         for name, case in zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True):
             table[name] = case.sum("start").assign_attrs(units="1", long_name="number of starts")
-        walks = self.observation_time, self.n_starts, self.seed, self.stride, self.acceleration
-        made = (
-            {"study": "compare"}
-            | tables.settings(self.controllers, *walks)
-            | {"conditions": self.conditions.settings()}
-        )
-        return table.assign_attrs(attributes(made))
+        return self.labelled(table, "compare")
 
 
 def compare(
@@ -135,8 +107,9 @@ def compare(
     """
     named = controllers if isinstance(controllers, Mapping) else {getattr(controllers, "name", "?"): controllers}
     several: Any = np.atleast_1d(velocities).tolist()
-    walks = conditions or Conditions(), stride or Stride(), acceleration
-    return run_study(Comparison(named, several, n_starts, observation_time, seed, *walks), folder, **how)
+    walks: Any = {"n_starts": n_starts, "seed": seed, "conditions": conditions or Conditions()}
+    study = Comparison(named, several, observation_time, acceleration, stride=stride or Stride(), **walks)
+    return run_study(study, folder, **how)
 
 
 def physical_flss(

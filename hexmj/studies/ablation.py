@@ -12,9 +12,9 @@ from hexmj.controllers.registry import load_controller
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.figures import caption
+from hexmj.measures.study import Study
 from hexmj.measures.tables import FRESH, PERIODS, differences, frequencies, happened, padded, velocity_axis
 from hexmj.plotting import head, heat_map, in_figure, picture, velocity_columns
-from hexmj.studies.base import Study
 from hexmj.studies.league import REGIMES
 from hexmj.studies.league_cells import Entrant, EntrantWalks, short_names
 from hexmj.sweep import Cell

@@ -14,9 +14,9 @@ from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.io import markdown_table
 from hexmj.measures.figures import caption
+from hexmj.measures.study import GROUND, Study
 from hexmj.phases import unrolled
 from hexmj.plotting import CURVE, LEGEND, SERIES, head, picture, tidy
-from hexmj.studies.base import GROUND, Study
 from hexmj.studies.quantities import JOINTS, PHASES, SEGMENTS, UNITS, quantity_table
 from hexmj.sweep import Cell
 from hexmj.validate import whole

@@ -15,9 +15,9 @@ from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.io import settings
 from hexmj.measures.figures import caption_of_at_least
+from hexmj.measures.study import Study
 from hexmj.measures.tables import differences, frequency, velocity_axis
 from hexmj.plotting import LEGEND, SERIES, flss_axes, frequency_curve, head, picture
-from hexmj.studies.base import Study
 from hexmj.studies.disturbed_walks import GRID, NO_DISTURBANCE, Answer, Case, Kind, StableWalks, Strategy
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration, check_reached, steps_within

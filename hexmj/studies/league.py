@@ -9,8 +9,8 @@ from hexmj.controllers.protocol import Controller
 from hexmj.controllers.wrappers import LegLost, PoorSenses
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
+from hexmj.measures.study import GROUND, Study
 from hexmj.measures.tables import FRESH, PERIODS
-from hexmj.studies.base import GROUND, Study
 from hexmj.studies.disturbed_walks import Case
 from hexmj.studies.league_cells import Entrant, EntrantWalks
 from hexmj.studies.standings import LEGS_LOST, TRIALS, standings

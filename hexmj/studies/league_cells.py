@@ -18,8 +18,8 @@ from hexmj.controllers.wrappers import LegLost
 from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
 from hexmj.gaits import steady_state_gait
 from hexmj.legs import LEGS
-from hexmj.measures.cells import UNITS
 from hexmj.measures.kinematic import first_loss
+from hexmj.measures.study import UNITS
 from hexmj.measures.tables import happened, over_start
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean
 from hexmj.starts import draw_starts

@@ -10,7 +10,7 @@ import numpy as np
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.legs import SIDE
-from hexmj.measures.cells import WalkSettings
+from hexmj.measures.study import WalkSettings
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.rotations import heading, rotated, turned
 from hexmj.threads import check_memory

@@ -11,14 +11,13 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller, FeedbackPlan
 from hexmj.errors import InputError, OutOfReach, SimulationError
-from hexmj.measures.cells import UNITS, WalkSettings
 from hexmj.measures.compare import BESIDE, MEASURES
 from hexmj.measures.figures import caption
+from hexmj.measures.study import UNITS, Study, WalkSettings
 from hexmj.measures.tables import differences, frequency, happened, over_start, velocity_axis
 from hexmj.plotting import LEGEND, head, heat_map, picture, velocity_columns
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
-from hexmj.studies.base import Study
 from hexmj.studies.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration, Stride

@@ -13,13 +13,12 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.measures.cells import WalkSettings
 from hexmj.measures.compare import with_flss
 from hexmj.measures.figures import caption
+from hexmj.measures.study import Study, WalkSettings
 from hexmj.measures.tables import over_start
 from hexmj.plotting import LEGEND, MEASURE_STYLES, frequency_curve, head, picture, tidy
 from hexmj.stability import loss_time, walk_margin
-from hexmj.studies.base import Study
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration
 from hexmj.validate import distinct

@@ -14,12 +14,11 @@ import numpy as np
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
-from hexmj.measures.cells import outcome_table
 from hexmj.measures.figures import caption_of_at_least
+from hexmj.measures.study import Study, outcome_table
 from hexmj.measures.tables import VELOCITY, reach
 from hexmj.plotting import LEGEND, SERIES, frequency_curve, head, picture, tidy
 from hexmj.stats import wilson_intervals
-from hexmj.studies.base import Study
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import steps_within
 from hexmj.validate import distinct

@@ -1,7 +1,8 @@
-"""Base of the studies: settings, checks, cells, and the attributes of their results."""
+"""Base of the studies, and the cells that most of them have: physical walks of one controller at one velocity."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -11,17 +12,55 @@ from hexmj.controllers.planning import check_velocities
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.io import attributes
-from hexmj.measures.cells import WalkSettings
-from hexmj.measures.tables import observed, settings
-from hexmj.starts import check_draw
+from hexmj.measures.tables import observed, over_start, settings
+from hexmj.progress import Progress
+from hexmj.starts import check_draw, draw_starts
 from hexmj.timing import Acceleration, Stride
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from hexmj.measures.physical import PhysicalWalk
+    from hexmj.physics.settle import Settled
 
 GROUND = "ground", "ground_height", "ground_at", "ground_length", "ground_seed"
 """Conditions of the ground, which some studies set."""
+
+UNITS = {
+    **dict.fromkeys(("planned_loss", "measured_loss", "fall", "topple"), "time unit"),
+    **dict.fromkeys(("clearance", "tracking", "depth"), "mm"),
+    **{"tilt": "rad", "slip": "mm/s"},
+}
+"""Units of `Outcomes`; the others are numbers."""
+
+
+@dataclass(frozen=True)
+class WalkSettings:
+    """Settings of the walks of a cell."""
+
+    controller: Controller
+    velocity: float
+    """V_r, or its final value when accelerating."""
+    duration: float
+    """Observation time [time units]."""
+    n_starts: int
+    seed: int
+    conditions: Conditions
+    stride: Stride
+    acceleration: Acceleration | None = None
+
+    @property
+    def starts(self) -> np.ndarray:
+        """Tips at time 0, (start, leg) [mm]."""
+        return draw_starts(self.n_starts, self.seed, self.stride)
+
+    def walk(self, starts: np.ndarray, threads: int | None) -> "PhysicalWalk":
+        """Return physical walks, kept whole, from some starts, (start, leg) [mm]."""
+        from hexmj.measures.physical import physical_walk
+
+        how: Any = {"conditions": self.conditions, "stride": self.stride, "acceleration": self.acceleration}
+        return physical_walk(starts, self.controller, self.velocity, self.duration, **how, threads=threads)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +83,7 @@ class Study:
 
     def __post_init__(self) -> None:
         check_draw(self.n_starts, self.seed)
+        distinct("controllers", [*self.plans()])
         for controller in self.plans().values():
             settings_of(controller)  # raises before the work, not after it
         given, usual = self.conditions.values(), type(self).conditions.values()
@@ -73,12 +113,16 @@ class Study:
 
     def plans(self) -> Mapping[str, Controller]:
         """Return all controllers by name."""
-        controller: Controller = getattr(self, "controller")  # noqa: B009  (a field of the subclass)
-        return {getattr(controller, "name", "?"): controller}
+        own: Any = self
+        return (
+            own.controllers if hasattr(self, "controllers") else {getattr(own.controller, "name", "?"): own.controller}
+        )
 
-    def walks(self, velocity: float, duration: float, conditions: Conditions) -> WalkSettings:
-        """Return the settings of a cell in which all starts walk."""
-        (controller,) = self.plans().values()
+    def walks(
+        self, velocity: float, duration: float, conditions: Conditions, controller: Controller | None = None
+    ) -> WalkSettings:
+        """Return the settings of a cell in which all starts walk with a controller, by default the only one."""
+        controller = controller or next(iter(self.plans().values()))
         same = self.n_starts, self.seed, conditions, self.stride, self.procedure
         return WalkSettings(controller, velocity, duration, *same)
 
@@ -103,3 +147,23 @@ class Study:
         made = settings(self.plans(), time, self.n_starts, self.seed, self.stride, self.procedure)
         conditions = {k: v for k, v in self.conditions.settings().items() if k not in self.set_by_study}
         return table.assign_attrs(attributes({"study": study} | made | own | {"conditions": conditions}))
+
+
+@lru_cache(maxsize=1)
+def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None) -> "Settled":
+    """Return the seed's starts at rest; cached, since all controllers begin with the same starts."""
+    from hexmj.physics.settle import settle
+
+    return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
+
+
+def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
+    """Return every field of `Outcomes` over start."""
+    from hexmj.measures.physical import physical_outcomes
+
+    settled = settled_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
+    outcomes = physical_outcomes(
+        settled, walks.controller, walks.velocity, walks.duration,
+        acceleration=walks.acceleration, threads=threads, progress=progress,
+    )  # fmt: skip
+    return over_start(vars(outcomes), UNITS)
