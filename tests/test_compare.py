@@ -18,7 +18,7 @@ from hexmj import (
     compare,
     physical_flss,
 )
-from hexmj.measures import cells
+from hexmj.measures import study
 from hexmj.measures.compare import Comparison
 from hexmj.physics import settle as settling
 from hexmj.studies.disturbance import DisturbedWalks
@@ -70,7 +70,7 @@ def test_only_what_is_missing_is_walked(result, folder, monkeypatch):
 
 
 def test_starts_settle_once(monkeypatch):
-    cells.settled_starts.cache_clear()
+    study.settled_starts.cache_clear()
     settled, settle = [], settling.settle
     monkeypatch.setattr(settling, "settle", lambda *given: (settled.append(given), settle(*given))[1])
     compare(BOTH, [0.4, 0.6], **FEW)

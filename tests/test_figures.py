@@ -60,7 +60,7 @@ MADE: dict[str, Callable[[], xr.Dataset]] = {
     "disturb": lambda: run_study(DisturbedWalks(hexmj.LDVS, [0.5, 0.6], ["halt", "leg"], **KINEMATIC)),
     "biology": lambda: run_study(Biology(hexmj.LDVS, 4, n_starts=2)),
     "league": lambda: run_study(League(entrants(("ldvs", "hws")), (0.5, 0.7), **SHORT)),
-    "ablate": lambda: run_study(Ablation({"ldvs": switched("ldvs")}, [0.5, 0.7], **FEW)),
+    "ablate": lambda: run_study(Ablation(switched("ldvs"), [0.5, 0.7], **FEW)),
     "search": searched,
     "recording": recorded,
 }

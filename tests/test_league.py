@@ -23,7 +23,7 @@ from hexmj.physics.settle import settle
 from hexmj.starts import draw_starts
 from hexmj.stats import paired_difference
 from hexmj.studies.league import League
-from hexmj.studies.league_cells import EVERYONE, Entrant, EntrantWalks, entrants, short_names, unless_refused
+from hexmj.studies.league_cells import EVERYONE, EntrantWalks, entrants, is_ideal, short_names, unless_refused
 from hexmj.studies.league_figure import FEWER, NOTHING, league_figure, walks_figure
 from hexmj.studies.standings import TRIALS, by_rank, league_markdown, ranks, tables
 from hexmj.sweep import run_cells
@@ -36,8 +36,8 @@ NAMES = ("wilson", "ldvs", "graham-ideal")
 
 @pytest.fixture(scope="module")
 def league() -> League:
-    takes_part = {**entrants(NAMES), "still": Entrant(Still())}
-    return League(takes_part, (0.3, 0.6), 2, 2, n_starts=12, observation_time=40.0, **SHORT)
+    takes_part = {**entrants(NAMES), "still": Still()}
+    return League(takes_part, (0.3, 0.6), 2, trial_starts=2, n_starts=12, observation_time=40.0, **SHORT)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_frequencies_are_those_of_the_commands(league: League, result) -> None:
 def test_the_way_is_what_was_walked_in_whole_steps() -> None:
     stride, conditions = Stride(dt=1.0), hexmj.Conditions()
     told: Any = {"conditions": conditions, "stride": stride, "threads": 1}
-    found = EntrantWalks(Entrant(hexmj.LDVS), 0.3, 20.9, 3, 1, stride).outcomes(hexmj.LDVS, conditions, 1)
+    found = EntrantWalks(hexmj.LDVS, 0.3, 20.9, 3, 1, conditions, stride).outcomes(threads=1)
     starts = draw_starts(3, 1, stride)
     end = physical_walk(starts, hexmj.LDVS, 0.3, 20.9, **told).qpos[-1, :, 0]
     walked, upright = end - settle(starts, conditions, stride, 1).qpos[:, 0], np.isinf(found.fall.values)
@@ -106,10 +106,9 @@ def test_nobody_is_pushed_in_a_window_that_holds_no_push(league: League) -> None
 
 @pytest.mark.parametrize("observation_time", ["start", 40.0])
 def test_a_window_of_accelerating_walks_begins_when_the_velocity_is_reached(observation_time: str | float) -> None:
-    eq11, entrant = hexmj.Acceleration(rate=0.01), Entrant(hexmj.load_controller("uncoordinated"))
-    found = EntrantWalks(entrant, 0.5, observation_time, 20, 0, Stride()).losses(eq11)
-    lost = first_loss(hexmj.draw_starts(20, 0), hexmj.UNCOORDINATED, 0.5, 80.0, acceleration=eq11)
-    assert np.array_equal(found.lost, np.isfinite(lost))
+    study = League({"one": hexmj.LDVS}, (0.5,), n_starts=2, observation_time=observation_time)
+    walks: Any = study.named_cells()["one", "accelerated"].function.__self__  # pyright: ignore
+    assert walks.duration == pytest.approx(40.0 + 0.8 / hexmj.Acceleration().rate)
 
 
 @pytest.mark.slow
@@ -157,12 +156,12 @@ def test_sequential_sets_and_those_that_read_legs_are_told_too() -> None:
 
 
 def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
-    entrant = Entrant(Stretched())
-    found = EntrantWalks(entrant, 0.5, 10.0, 6, 0, Stride()).outcomes(entrant.controller, Conditions())
+    found = EntrantWalks(Stretched(), 0.5, 10.0, 6, 0, Conditions(), Stride()).outcomes()
     refused = hexmj.draw_starts(6, 0)[:, 0] > 0
     assert refused.any() and not refused.all()
-    still = EntrantWalks(Entrant(Still()), 0.5, 10.0, 6, 0, Stride()).outcomes(Still(), Conditions())
-    for name, values in found.items():
+    still = EntrantWalks(Still(), 0.5, 10.0, 6, 0, Conditions(), Stride()).outcomes()
+    assert np.array_equal(found.missing, refused)
+    for name, values in found.drop_vars("missing").items():
         assert np.isnan(values.values[refused]).all()
         assert np.array_equal(values.values[~refused], still[name].values[~refused], equal_nan=True)
     assert np.array_equal(happened(found.fall).isnull(), refused)
@@ -171,10 +170,8 @@ def test_a_walk_that_is_refused_is_no_outcome_and_stops_nobody_else() -> None:
 
 
 def test_where_every_walk_is_refused_nothing_is_known_and_the_league_goes_on() -> None:
-    entrant = Entrant(Stretched())
-    alone = League(
-        {"far": entrant}, (0.5,), 1, 1, n_starts=1, observation_time=10.0, accelerating=False, periods=12, seed=0
-    )
+    few: Any = SHORT | {"trial_starts": 1, "n_starts": 1, "observation_time": 10.0}
+    alone = League({"far": Stretched()}, (0.5,), 1, **few)
     result = alone.result([cell.compute(threads=1) for cell in alone.cells()])
     assert np.isnan(result.physical).all() and (result.physical_starts == 0).all() and np.isnan(result.cost).all()
     assert "nan" not in league_markdown(result)
@@ -200,9 +197,8 @@ def test_a_refused_walk_is_missing_and_the_others_are_as_they_were(error: type[E
 
 
 def test_conditions_in_which_no_start_comes_to_rest_are_an_error() -> None:
-    entrant = Entrant(Still())
     with pytest.raises(SimulationError):
-        EntrantWalks(entrant, 0.3, 5.0, 2, 0, Stride()).outcomes(entrant.controller, Conditions(settling_time=3.0))
+        EntrantWalks(Still(), 0.3, 5.0, 2, 0, Conditions(settling_time=3.0), Stride()).outcomes()
 
 
 def test_a_difference_leaves_out_starts_that_are_not_known_and_takes_parts_of_walks() -> None:
@@ -248,7 +244,7 @@ def test_everyone_is_found_and_can_be_asked_everything() -> None:
     for name, entrant in takes_part.items():
         asked = {what for one, what in named if one == name}
         assert "physics 0.5" in asked and "kinematic 0.5" in asked
-        assert entrant.ideal != ({*TRIALS} <= asked)
+        assert is_ideal(name, entrant) != ({*TRIALS} <= asked)
     with pytest.raises(InputError, match="ideal_start"):
         entrants(("ldvs-ideal",))
 
@@ -275,7 +271,7 @@ def test_controllers_of_files_have_short_and_distinct_names(tmp_path: Path, monk
     assert short_names({name: hexmj.load_controller(name) for name in expected}) == expected
     takes_part = entrants(("own.py:One", "own.py:One-ideal", "graham-ideal"))
     assert [*takes_part] == ["one", "one-ideal", "graham-ideal"]
-    assert [entrant.ideal for entrant in takes_part.values()] == [False, True, True]
+    assert [is_ideal(*entrant) for entrant in takes_part.items()] == [False, True, True]
 
 
 @dataclass(frozen=True)
@@ -293,7 +289,7 @@ class Many(Still):
         ("periods", lambda: League(entrants(("ldvs",)), periods=0)),
         ("trial_starts", lambda: League(entrants(("ldvs",)), trial_starts=0)),
         ("ideal_start", lambda: entrants(("ldvs-ideal",))),
-        ("ideal_start", lambda: Entrant(Many(), ideal=True).starts(1, 0, 0.5, Stride())),
+        ("ideal_start", lambda: EntrantWalks(Many(), 0.5, 9.0, 1, 0, Conditions(), Stride(), ideal=True).starts),
     ],
 )
 def test_bad_input_is_refused(name: str, make: Any) -> None:

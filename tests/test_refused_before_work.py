@@ -15,7 +15,6 @@ from hexmj.studies.ablation import Ablation
 from hexmj.studies.biology import Biology
 from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.studies.league import League
-from hexmj.studies.league_cells import Entrant
 from hexmj.studies.stability_map import StabilityMap
 from hexmj.studies.terrain import Terrain
 
@@ -94,14 +93,14 @@ FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
         Terrain(LIMITED, **FAST),
         DisturbedWalks(LIMITED, disturbances=("push",), impulses=(1.0,), strategies=(), **FAST),
         Biology(LIMITED, n_starts=2),
-        Ablation({"limited": {"limited": LIMITED}}, **FAST, physical_starts=1),
+        Ablation({"limited": LIMITED}, **FAST, physical_starts=1),
         Terrain(hexmj.SensoryFeedback(LIMITED), **FAST),
         Terrain(LegLost(LIMITED, 0), **FAST),
         Terrain(PoorSenses(hexmj.SensoryFeedback(LIMITED)), **FAST),
         Terrain(WithOffsets(Still(), controller=LIMITED), **FAST),
-        League({"limited": Entrant(LIMITED)}, (0.1, 0.3), **FEW),
-        League({"limited": Entrant(LIMITED)}, (0.1,), trial_velocity=0.3, **FEW),
-        League({"limited": Entrant(LIMITED, ideal=True)}, (0.1, 0.3), **FEW),
+        League({"limited": LIMITED}, (0.1, 0.3), **FEW),
+        League({"limited": LIMITED}, (0.1,), trial_velocity=0.3, **FEW),
+        League({"limited-ideal": LIMITED}, (0.1, 0.3), **FEW),
     ],
     ids=lambda study: type(study).__name__,
 )
@@ -113,7 +112,7 @@ def test_every_study_asks_for_limits_before_its_cells(study) -> None:
 
 
 def test_ideal_entrants_are_asked_only_for_their_velocities() -> None:
-    assert League({"limited": Entrant(LIMITED, ideal=True)}, (0.1,), **FEW).cells()
+    assert League({"limited-ideal": LIMITED}, (0.1,), **FEW).cells()
 
 
 def test_walks_that_accelerate_are_not_refused_before_the_work() -> None:
@@ -123,9 +122,9 @@ def test_walks_that_accelerate_are_not_refused_before_the_work() -> None:
 
 def test_a_load_without_trials_refuses_no_league() -> None:
     """Entrants from ideal starts take no trials."""
-    ideal = Entrant(hexmj.load_controller("graham"), ideal=True)
-    league = League({"graham-ideal": ideal}, velocities=(0.5,), conditions=hexmj.Conditions(grasp=10.0))
+    graham = {"graham-ideal": hexmj.load_controller("graham")}
+    league = League(graham, velocities=(0.5,), conditions=hexmj.Conditions(grasp=10.0))
     assert len(league.cells()) == 2
-    tried = replace(league, controllers={"ldvs": Entrant(hexmj.LDVS)})
+    tried = replace(league, controllers={"ldvs": hexmj.LDVS})
     with pytest.raises(hexmj.InputError, match="grasp = 10"):
         tried.cells()

@@ -15,11 +15,10 @@ from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
 from hexmj.studies.league import DISTURBED, GROUNDS, League, crossed
-from hexmj.studies.league_cells import Entrant
 from hexmj.studies.standings import TRIALS
 from hexmj.timing import Stride
 
-ONE = {"ldvs": Entrant(hexmj.LDVS)}
+ONE = {"ldvs": hexmj.LDVS}
 LARGER = replace(STICK_INSECT, lengths=STICK_INSECT.lengths.scaled(1.5), standing_height=15.0)
 
 
@@ -46,7 +45,7 @@ def test_grounds_lie_as_the_body_is_large() -> None:
 def test_grounds_that_no_leg_of_a_larger_body_gets_to_are_no_trials() -> None:
     for body, expected in ((STICK_INSECT, True), (LARGER, False)):
         league = League(ONE, observation_time=300.0, conditions=Conditions(body=body))
-        tried = [name for name, *_ in league._tried(Entrant(hexmj.LDVS))]
+        tried = [question for _, question in league.named_cells()]
         assert ("step" in tried, "load" in tried) == (expected, True), "90 mm are walked"
 
 

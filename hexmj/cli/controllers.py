@@ -74,14 +74,16 @@ class League(StudyCommand):
         from hexmj.files import write_text
         from hexmj.replay.film import Film
         from hexmj.replay.recording import Start
+        from hexmj.studies.league_cells import is_ideal
         from hexmj.studies.standings import by_rank, league_markdown
 
         files = [write_text(given.out / "league.md", league_markdown(result))]
-        best = [name for name in by_rank(result).entrant.values if not given.entrants[name].ideal][:FILMED]
+        ranked = by_rank(result).entrant.values.tolist()
+        best = [name for name in ranked if not is_ideal(name, given.entrants[name])][:FILMED]
         if given.no_video or not best:
             return files
         how: Any = {"velocity": given.trial_velocity, "start": 0, "acceleration": None}
-        walks = {name: build(Start, given, controller=given.entrants[name].controller, **how) for name in best}
+        walks = {name: build(Start, given, controller=given.entrants[name], **how) for name in best}
         shown = [walk.recorded(True, name, given.threads) for name, walk in walks.items()]
         return files + filmed(given.out / "league.mp4", shown, Film(width=480, height=360))
 

@@ -2,6 +2,7 @@
 
 from contextlib import nullcontext
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +11,7 @@ from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import advanced, begin, check_repeats, check_same
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
 from hexmj.measures.kinematic import first_loss
-from hexmj.physics.outcomes import Outcomes, OutcomesSoFar, WalkSoFar
+from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar, WalkSoFar
 from hexmj.physics.pushes import Push
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, settle
@@ -141,6 +142,7 @@ def physical_outcomes(
     duration: float,
     *,
     acceleration: Acceleration | None = None,
+    effort: EffortSoFar | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Outcomes:
@@ -150,6 +152,7 @@ def physical_outcomes(
 
     Args:
         settled: starts at rest, see `settle.settle`; the other arguments are those of `physical_walk`.
+        effort: adds up the work and the torques of the same walks.
 
     Raises:
         InputError, SimulationError: see `rollout.drive`.
@@ -160,7 +163,8 @@ def physical_outcomes(
     planned_loss = first_loss(
         starts, controller, velocity, duration, stride=stride, acceleration=acceleration, threads=threads
     )
-    return outcomes_of_plan(settled, plan, duration, planned_loss, threads=threads, progress=progress)
+    how: Any = {"effort": effort, "threads": threads, "progress": progress}
+    return outcomes_of_plan(settled, plan, duration, planned_loss, **how)
 
 
 def outcomes_of_plan(
@@ -170,6 +174,7 @@ def outcomes_of_plan(
     planned_loss: np.ndarray,
     *,
     push: Push | None = None,
+    effort: EffortSoFar | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Outcomes:
@@ -177,6 +182,8 @@ def outcomes_of_plan(
     so_far = OutcomesSoFar(settled, planned_loss)
     for chunk in drive(settled, plan, duration, push=push, threads=threads, progress=progress):
         so_far.add(chunk)
+        if effort:
+            effort.add(chunk)
     return so_far.outcomes()
 
 

@@ -1,6 +1,6 @@
 """Base of the studies, and the cells that most of them have: physical walks of one controller at one velocity."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -10,7 +10,7 @@ import numpy as np
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import check_velocities
 from hexmj.controllers.protocol import Controller, settings_of
-from hexmj.errors import InputError
+from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
 from hexmj.io import attributes
 from hexmj.measures.tables import observed, over_start, settings
 from hexmj.progress import Progress
@@ -155,6 +155,39 @@ def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Str
     from hexmj.physics.settle import settle
 
     return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
+
+
+@lru_cache(maxsize=1)
+def standing_starts(
+    n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None
+) -> np.ndarray:
+    """Return the indices of the seed's starts that come to rest on six feet; cached for the other velocities."""
+    from hexmj.physics.settle import settle
+
+    starts, everyone = draw_starts(n_starts, seed, stride), np.arange(n_starts)
+    parts = [part for part, _ in by_halves(everyone, lambda part: settle(starts[part], conditions, stride, threads))]
+    return np.concatenate([everyone[:0], *parts])
+
+
+def by_halves(
+    which: np.ndarray, walk: Callable[[np.ndarray], Any], diverging: bool = False
+) -> Iterator[tuple[np.ndarray, Any]]:
+    """Yield parts of the starts with what they return; starts that have no outcome are left out.
+
+    A start has none if it cannot stand, its tips are out of reach or a push still acts at the end.
+
+    Args:
+        which: indices of the starts, (n,).
+        walk: walks some of the starts, (n,); the outcome of a start must not depend on the others.
+        diverging: whether walks that diverge are left out too; else they are an error.
+    """
+    try:
+        yield which, walk(which)
+    except (OutOfReach, SimulationError, StillThrown) as error:
+        if getattr(error, "state", None) and not diverging:
+            raise
+        for half in np.array_split(which, 2) if len(which) > 1 else ():
+            yield from by_halves(half, walk, diverging)
 
 
 def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":

@@ -9,6 +9,7 @@ import numpy as np
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.starts import SAMPLE, checked_list
 from hexmj.stats import paired_difference, wilson_intervals
+from hexmj.sweep import over_axes
 from hexmj.timing import Acceleration, Stride, check_in_time, check_reached, observation_duration, steps_within
 
 if TYPE_CHECKING:
@@ -122,10 +123,10 @@ def happened(time: "xr.DataArray") -> "xr.DataArray":
     return (time < np.inf).where(time.notnull())
 
 
-def padded(rows: Sequence[Sequence[Any]]) -> np.ndarray:
-    """Return events of each start, 0 or 1, as one array (row, column, start), with NaN for missing starts."""
-    most = max(len(cell) for row in rows for cell in row)
-    return np.array([[[*map(float, cell), *[np.nan] * (most - len(cell))] for cell in row] for row in rows])
+def over_cells(sizes: Mapping[str, int], data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+    """Combine cells as `over_axes` does; starts and variables that a cell does not have are NaN."""
+    numbered = [cell.assign_coords(start=np.arange(cell.sizes.get("start", 0))) for cell in data]
+    return over_axes(sizes, numbered, join="outer", data_vars="all").transpose(*sizes, "start")
 
 
 def frequency(name: str, events: np.ndarray, dims: Dims) -> dict[str, Any]:

@@ -1,24 +1,24 @@
 """Controllers without one mechanism or rule, or with one more, beside the whole, on the same starts."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.registry import load_controller
+from hexmj.controllers.registry import VARIED, load_controller
 from hexmj.errors import InputError
-from hexmj.gaits import CYCLES
 from hexmj.measures.figures import caption
-from hexmj.measures.study import Study
-from hexmj.measures.tables import FRESH, PERIODS, differences, frequencies, happened, padded, velocity_axis
+from hexmj.measures.tables import differences, frequencies, over_cells, velocity_axis
 from hexmj.plotting import head, heat_map, in_figure, picture, velocity_columns
 from hexmj.studies.league import REGIMES
-from hexmj.studies.league_cells import Entrant, EntrantWalks, short_names
+from hexmj.studies.league_cells import ControllerStudy, EntrantWalks, short_names
 from hexmj.sweep import Cell
-from hexmj.validate import distinct, whole
+from hexmj.timing import observation_duration
+from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,10 +40,16 @@ NOTES = {NONE: "no walk is left", FEWER: "walks are missing that diverged or wer
 """Marks of a cell without a number, and of one with missing walks -> their meaning."""
 
 
-def wholes(names: Sequence[str]) -> dict[str, dict[str, Controller]]:
-    """Return the controllers `switched` of each whole, by short names."""
+def wholes(names: Sequence[str]) -> dict[str, Controller]:
+    """Return the controllers `switched` of each whole, by short names.
+
+    Raises:
+        InputError: two of them have the same name, or one has nothing to switch.
+    """
     short = short_names({name: load_controller(name) for name in names})
-    return {short[name]: switched(name, short[name]) for name in names}
+    several = [switched(name, short[name]) for name in names]
+    distinct("controllers", [name for found in several for name in found])
+    return {name: controller for found in several for name, controller in found.items()}
 
 
 def switched(name: str, shown: str = "") -> dict[str, Controller]:
@@ -68,46 +74,34 @@ def switched(name: str, shown: str = "") -> dict[str, Controller]:
 
 
 @dataclass(frozen=True)
-class Ablation(Study):
-    """The same starts for every controller: all of them in kinematic walks, the first of them in physics."""
+class Ablation(ControllerStudy):
+    """The same starts for every controller: all of them in kinematic walks, the first of them in physics.
 
-    controllers: Mapping[str, Mapping[str, Controller]]
-    """Controllers of each whole by name, the whole itself first, as `wholes` returns them."""
-    velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
-    """Velocities V_r as fractions of V_p, 0 < V < 1."""
-    physical_starts: int = 100
-    """Number of the starts that walk in physics; at most all."""
-    periods: int = PERIODS
-    """Cycles of every leg until its steady-state gait is measured."""
-    n_starts: int = field(default=1000, kw_only=True)
-    """Number of random starts of kinematic walks, the same for all."""
-    seed: int = field(default=FRESH, kw_only=True)
-    """Seed of the random starts."""
+    A controller with a name such as ldvs-without-3 is compared with its whole, here ldvs, if that takes part.
+    """
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        whole("physical_starts", self.physical_starts, 1)
-        whole("periods", self.periods, CYCLES + 2)
-        distinct("controllers", [name for several in self.controllers.values() for name in several])
-        if not (self.observed[0] > 0).all():
-            raise InputError(f"velocities = {self.velocities}; expected each above 0")
-
-    def plans(self) -> Mapping[str, Controller]:
-        return {name: controller for several in self.controllers.values() for name, controller in several.items()}
+    @property
+    def wholes(self) -> list[str]:
+        """The name of the whole of each controller."""
+        names = [(name, VARIED.fullmatch(name)) for name in self.controllers]
+        return [part["name"] if part and part["name"] in self.controllers else name for name, part in names]
 
     def cells(self) -> list[Cell]:
         """Return a cell for each controller, measure and velocity."""
         self.check_walks(self.velocities, self.conditions)
-        observed = [*zip(*(axis.tolist() for axis in self.observed), strict=True)]
         few = {"limit": min(self.n_starts, REGIMES), "physical": min(self.physical_starts, self.n_starts)}
         cells = []
-        for (name, controller), measure, (v, time) in product(self.plans().items(), MEASURES, observed):
-            until, n_starts = "start" if measure == "start" else "walk", few.get(measure, self.n_starts)
-            walks = EntrantWalks(Entrant(controller), v, until, n_starts, self.seed, self.stride)
-            function, own, cost = {
-                "limit": (walks.gaits, {"periods": self.periods}, 10),
-                "physical": (walks.outcomes, {"controller": controller, "conditions": self.conditions}, 20),
-            }.get(measure, (walks.losses, {}, 1))
+        velocities: list[float] = self.observed[0].tolist()
+        for (name, controller), measure, v in product(self.controllers.items(), MEASURES, velocities):
+            time = float(observation_duration("start" if measure == "start" else "walk", v, self.stride))
+            conditions = self.conditions if measure == "physical" else Conditions()
+            same = few.get(measure, self.n_starts), self.seed, conditions, self.stride
+            walks = EntrantWalks(controller, v, time, *same)
+            own = {"periods": self.periods} if measure == "limit" else {}
+            function, cost = {
+                "limit": (walks.gaits, 10),
+                "physical": (walks.outcomes, 20),
+            }.get(measure, (walks.losses, 1))
             cells.append(Cell(f"{name}-{measure}-V-{v:g}", function, own, cost * time))
         return cells
 
@@ -120,23 +114,17 @@ class Ablation(Study):
         """
         import xarray as xr
 
-        names = list(self.plans())
-        events = padded([[_events(cell) for cell in data]]).reshape(len(names), len(MEASURES), len(self.velocities), -1)
-        whole_of = [whole for whole, several in self.controllers.items() for _ in several]
-        wholes = events[[names.index(whole) for whole in whole_of]]
-        dims = "controller", "measure", "velocity"
+        names, dims = list(self.controllers), ("controller", "measure", "velocity")
+        sizes = dict(zip(dims, (len(names), len(MEASURES), len(self.velocities)), strict=True))
+        found = over_cells(sizes, data)
+        lost = found.lost.fillna(found.fell)  # a cell has either of them, or `stable`
+        events = lost.fillna(1.0 - found.stable).values
+        wholes = events[[names.index(whole) for whole in self.wholes]]
         table = frequencies("frequency", events, dims) | differences("more", events, wholes, dims)
-        axes = {"controller": names, "measure": list(MEASURES), "whole": ("controller", whole_of)}
+        axes = {"controller": names, "measure": list(MEASURES), "whole": ("controller", self.wholes)}
         own = {"physical_starts": min(self.physical_starts, self.n_starts), "periods": self.periods}
         result = xr.Dataset(table, axes).assign_coords(velocity_axis(*self.observed))
         return self.labelled(result, "ablate", **own)
-
-
-def _events(cell: "xr.Dataset") -> np.ndarray:
-    """Return the events that a cell counts, (start,), 0 or 1; NaN for walks that fail."""
-    if "lost" in cell:
-        return cell.lost.values.astype(float)
-    return happened(cell.fall).values if "fall" in cell else 1.0 - cell.stable.values
 
 
 def ablation_figure(result: "xr.Dataset") -> "Figure":

@@ -1,30 +1,26 @@
-"""Entrants of a league or an ablation, and their cells: kinematic losses, steady-state gaits, falls and trials."""
+"""Controllers of a league or an ablation, and their cells: kinematic losses, steady-state gaits, falls and trials."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.conditions import Conditions
 from hexmj.controllers.baselines import BASELINES
-from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.planning import begin, check_repeats
-from hexmj.controllers.protocol import Controller, FeedbackPlan, SteerableController
+from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import VARIED, known_names, load_controller
-from hexmj.controllers.wrappers import LegLost
-from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
-from hexmj.gaits import steady_state_gait
+from hexmj.errors import InputError
+from hexmj.gaits import CYCLES, steady_state_gait
 from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
-from hexmj.measures.study import UNITS
-from hexmj.measures.tables import happened, over_start
+from hexmj.measures.study import UNITS, Study, WalkSettings, by_halves, standing_starts
+from hexmj.measures.tables import FRESH, PERIODS, happened, over_start
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import Case, StableWalks, TooFewStable
-from hexmj.timing import Acceleration, Stride, observation_duration, steps_within
+from hexmj.timing import observation_duration, steps_within
+from hexmj.validate import whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,51 +37,31 @@ EVERYONE = (*NETWORK, *BASELINES, *(f"{name}{IDEAL}" for name in ("wilson", "gra
 FOUR = ("ldvs", "uncoordinated", "wilson", "graham-ideal")
 """Entrants of a quick look."""
 
+EFFORT = {"work": "mm", "torque": "1", "way": "mm"}
+"""Columns beside the outcomes, and their units."""
 
-@dataclass(frozen=True)
-class Entrant:
-    """A controller, and how it begins."""
-
-    controller: Controller
-    ideal: bool = False
-    """Whether it begins at its `ideal_start(velocity, stride)`, (1, leg) tips [mm], the same for all walks."""
-
-    def __post_init__(self) -> None:
-        if self.ideal and not hasattr(self.controller, "ideal_start"):
-            raise InputError(f"controller = {self.controller.name} has no ideal_start")
-
-    def starts(self, n_starts: int, seed: int, velocity: float, stride: Stride) -> np.ndarray:
-        """Return random starts, (start, leg) [mm], or the ideal one alone."""
-        if not self.ideal:
-            return draw_starts(n_starts, seed, stride)
-        controller: Any = self.controller
-        start = np.array(controller.ideal_start(velocity, stride), dtype=float)
-        if start.shape != (1, len(LEGS)):
-            raise InputError(f"ideal_start of {self.controller.name} has the shape {start.shape}; expected (1, 6)")
-        return start
-
-    def reading(self, velocity: float, stride: Stride) -> Controller | None:
-        """Return the controller with sensory feedback, if it has it or its plans can be steered."""
-        if isinstance(begin(self.controller, draw_starts(1, 0, stride), velocity, stride), FeedbackPlan):
-            return self.controller
-        return SensoryFeedback(self.controller) if self.steerable else None
-
-    @property
-    def steerable(self) -> bool:
-        """Whether the controller can be halted, and a leg of it stopped."""
-        return isinstance(self.controller, SteerableController)
+DISTURBED = {"time": "time unit", "fall": "time unit"}
+"""Columns of disturbed walks, and their units."""
 
 
-def entrants(names: Sequence[str], load: Callable[[str], Controller] = load_controller) -> Mapping[str, Entrant]:
-    """Return entrants by `short_names`, from names of controllers, with the end `IDEAL` for an ideal start.
+def is_ideal(name: str, controller: Controller) -> bool:
+    """Whether an entrant begins at its `ideal_start(velocity, stride)`, (1, leg) tips [mm], the same for all walks."""
+    return name.endswith(IDEAL) and hasattr(controller, "ideal_start")
+
+
+def entrants(names: Sequence[str]) -> dict[str, Controller]:
+    """Return controllers by `short_names`, from their names, with the end `IDEAL` for an ideal start.
 
     Raises:
         InputError: there is no such controller, or it has no ideal start.
     """
     plain = {name: name.removesuffix(IDEAL) for name in names}
-    found = {name: load(name) for name in plain.values()}
+    found = {name: load_controller(name) for name in plain.values()}
     short = short_names(found)
-    return {short[own] + IDEAL * (own != name): Entrant(found[own], ideal=own != name) for name, own in plain.items()}
+    for name, own in plain.items():
+        if own != name and not is_ideal(name, found[own]):
+            raise InputError(f"controller = {own} has no ideal_start")
+    return {short[own] + IDEAL * (own != name): found[own] for name, own in plain.items()}
 
 
 def short_names(found: Mapping[str, Controller]) -> dict[str, str]:
@@ -98,55 +74,63 @@ def short_names(found: Mapping[str, Controller]) -> dict[str, str]:
     return {name: name if often[shown] > 1 else shown for name, shown in short.items()}
 
 
-REFUSALS = OutOfReach, SimulationError, StillThrown
-"""Errors of a walk that has no outcome."""
+@dataclass(frozen=True)
+class ControllerStudy(Study):
+    """A study of several controllers: all starts in kinematic walks, the first of them in physics."""
 
-EFFORT = {"work": "mm", "torque": "1", "way": "mm"}
-"""Columns beside the outcomes, and their units."""
+    controllers: Mapping[str, Controller]
+    """Controllers by their names in the result."""
+    velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
+    """Velocities V_r as fractions of V_p, 0 < V < 1."""
+    physical_starts: int = 100
+    """Number of the starts that walk in physics at every velocity; at most all."""
+    periods: int = PERIODS
+    """Cycles of every leg until its steady-state gait is measured."""
+    n_starts: int = field(default=1000, kw_only=True)
+    """Number of random starts of kinematic walks, the same for all."""
+    seed: int = field(default=FRESH, kw_only=True)
+    """Seed of the random starts."""
 
-DISTURBED = {"time": "time unit", "fall": "time unit"}
-"""Columns of disturbed walks, and their units."""
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        whole("physical_starts", self.physical_starts, 1)
+        whole("periods", self.periods, CYCLES + 2)
+        if not (self.observed[0] > 0).all():
+            raise InputError(f"velocities = {self.velocities}; expected each above 0")
 
 
 @dataclass(frozen=True)
-class EntrantWalks:
+class EntrantWalks(WalkSettings):
     """Walks of an entrant; each method is the function of a cell, and returns columns over start."""
 
-    entrant: Entrant
-    velocity: float
-    """V_r, or its final value."""
-    observation_time: str | float
-    """'walk', 'start' or a number [time units]; when accelerating, counted from V_r on."""
-    n_starts: int
-    seed: int
-    stride: Stride
+    ideal: bool = False
+    """Whether there is one start, see `is_ideal`."""
 
     @property
     def starts(self) -> np.ndarray:
         """Tips at time 0, (start, leg) [mm]."""
-        return self.entrant.starts(self.n_starts, self.seed, self.velocity, self.stride)
+        if not self.ideal:
+            return super().starts
+        controller: Any = self.controller
+        start = np.array(controller.ideal_start(self.velocity, self.stride), dtype=float)
+        if start.shape != (1, len(LEGS)):
+            raise InputError(f"ideal_start of {self.controller.name} has the shape {start.shape}; expected (1, 6)")
+        return start
 
-    @property
-    def duration(self) -> float:
-        """Observation time [time units]."""
-        return float(observation_duration(self.observation_time, self.velocity, self.stride))
+    def losses(self, threads: int | None = None) -> "xr.Dataset":
+        """Return whether each start loses static stability in its planned walk, `lost`."""
+        how: Any = {"stride": self.stride, "acceleration": self.acceleration, "threads": threads}
+        time = first_loss(self.starts, self.controller, self.velocity, self.duration, **how)
+        return over_start({"lost": np.isfinite(time).astype(np.int8)})
 
-    def losses(
-        self, acceleration: Acceleration | None = None, leg_lost: int | None = None, threads: int | None = None
+    def losses_over_range(
+        self, low: float, high: float, observation_time: str | float, threads: int | None = None
     ) -> "xr.Dataset":
-        """Return whether each start loses static stability in its planned walk, `lost`, perhaps without a leg."""
-        controller = self.entrant.controller if leg_lost is None else LegLost(self.entrant.controller, leg_lost)
-        duration = self.duration + (acceleration.duration(self.velocity) if acceleration else 0.0)
-        how = {"stride": self.stride, "acceleration": acceleration, "threads": threads}
-        return _lost(first_loss(self.starts, controller, self.velocity, duration, **how))
-
-    def losses_over_range(self, low: float, high: float, threads: int | None = None) -> "xr.Dataset":
         """Return `lost` with a velocity for each start, uniform from `low` to `high` (Eq. 10)."""
         velocity = np.random.default_rng([self.seed, 1]).uniform(low, high, self.n_starts)
-        duration = observation_duration(self.observation_time, velocity, self.stride)
-        starts = draw_starts(self.n_starts, self.seed, self.stride)
-        how = {"stride": self.stride, "threads": threads}
-        return _lost(first_loss(starts, self.entrant.controller, velocity, duration, **how))
+        duration = observation_duration(observation_time, velocity, self.stride)
+        time = first_loss(self.starts, self.controller, velocity, duration, stride=self.stride, threads=threads)
+        return over_start({"lost": np.isfinite(time).astype(np.int8)})
 
     def gaits(self, periods: int, threads: int | None = None) -> "xr.Dataset":
         """Return the steady-state gait of each start after so many `periods`, see `gaits.steady_state_gait`.
@@ -155,8 +139,8 @@ class EntrantWalks:
             `reached`, the time from which on the gait lasts [time units], or inf; whether it is `stable`; and, NaN
             without a gait, the `duty_factor` and the phases `ipsilateral` and `contralateral`, as circular means.
         """
-        how = {"seed": self.seed, "stride": self.stride, "periods": periods, "threads": threads}
-        gait = steady_state_gait(self.entrant.controller, self.velocity, n_starts=self.n_starts, **how)
+        how: Any = {"seed": self.seed, "stride": self.stride, "periods": periods, "threads": threads}
+        gait = steady_state_gait(self.controller, self.velocity, n_starts=self.n_starts, **how)
         columns = {
             "reached": gait.reached,
             "stable": gait.stable.astype(np.int8),
@@ -166,59 +150,52 @@ class EntrantWalks:
         }
         return over_start(columns, {"reached": "time unit"})
 
-    def outcomes(self, controller: Controller, conditions: Conditions, threads: int | None = None) -> "xr.Dataset":
-        """Return the outcome of every physical walk with the entrant's controller, or a changed one.
+    def outcomes(self, threads: int | None = None) -> "xr.Dataset":
+        """Return the outcome of every physical walk.
 
         Returns:
-            All `Outcomes`; the `work` of the joints over the insect's weight [mm] and the greatest `torque` over its
-            limit, see `EffortSoFar`; the `way` walked ahead [mm]. NaN for walks that fail, see `unless_refused`.
+            All `Outcomes`, whether the start `fell`, and whether its walk is `missing`; the `work` of the joints over
+            the insect's weight [mm] and the greatest `torque` over its limit, see `EffortSoFar`; the `way` walked ahead
+            [mm]. NaN for walks that fail, see `unless_refused`.
 
         Raises:
             SimulationError: none of the random starts comes to rest.
         """
-        from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar
-        from hexmj.physics.rollout import drive
+        from hexmj.measures.physical import physical_outcomes
+        from hexmj.physics.outcomes import EffortSoFar, Outcomes
         from hexmj.physics.settle import settle
 
-        starts, velocity, stride, duration = self.starts, self.velocity, self.stride, self.duration
-        steps = int(steps_within(duration, stride))
+        starts, conditions, stride = self.starts, self.conditions, self.stride
         columns = {field.name: UNITS.get(field.name, "1") for field in fields(Outcomes)} | EFFORT
 
         def walked(which: np.ndarray) -> "xr.Dataset":
-            some = starts[which]
-            check_repeats(controller, some, velocity, steps, stride)
-            settled = settle(some, conditions, stride, threads)
-            lost = first_loss(some, controller, velocity, duration, stride=stride, threads=threads)
-            so_far, effort = OutcomesSoFar(settled, lost), EffortSoFar(settled)
-            for chunk in drive(settled, begin(controller, some, velocity, stride), duration, threads=threads):
-                so_far.add(chunk)
-                effort.add(chunk)
-            outcomes = so_far.outcomes()
+            settled = settle(starts[which], conditions, stride, threads)
+            effort = EffortSoFar(settled)
+            how: Any = {"threads": threads, "effort": effort}
+            outcomes = physical_outcomes(settled, self.controller, self.velocity, self.duration, **how)
             costs = {"work": effort.work / settled.compiled.weight, "torque": effort.torque}
-            commanded = np.minimum(outcomes.fall, steps * stride.dt) * velocity
+            time = int(steps_within(self.duration, stride)) * stride.dt
+            commanded = np.minimum(outcomes.fall, time) * self.velocity
             return over_start(vars(outcomes) | costs | {"way": commanded * outcomes.speed}, columns)
 
         found = unless_refused(walked, len(starts), columns)
-        if found.fall.isnull().all():
-            _check_settles(draw_starts(self.n_starts, self.seed, stride), conditions, stride, threads)
-        return found
+        random = self.n_starts, self.seed
+        if found.fall.isnull().all() and not standing_starts(*random, conditions, stride, threads).size:
+            settle(draw_starts(*random, stride), conditions, stride, threads)
+        return found.assign(fell=happened(found.fall), missing=found.fall.isnull())
 
-    def disturbed(self, case: Case, conditions: Conditions, threads: int | None = None) -> "xr.Dataset":
+    def disturbed(self, case: Case, threads: int | None = None) -> "xr.Dataset":
         """Return whether disturbed starts `fell`: 1 or 0.
 
         NaN if too few starts are stable until the disturbance, the insect fell before it, or the walk fails.
         """
-        stable = StableWalks(self.entrant.controller, self.velocity, self.n_starts, self.seed, self.stride)
-        how = case, self.duration, None, conditions, threads
+        stable = StableWalks(self.controller, self.velocity, self.n_starts, self.seed, self.stride)
+        how = case, self.duration, None, self.conditions, threads
         try:
             times = unless_refused(lambda which: stable.times(*how, which)[[*DISTURBED]], self.n_starts, DISTURBED)
         except TooFewStable:
             return over_start({"fell": np.full(self.n_starts, np.nan)})
-        return over_start({"fell": happened(times.fall).where(~(times.fall <= times.time)).values})
-
-
-def _lost(time: np.ndarray) -> "xr.Dataset":
-    return over_start({"lost": np.isfinite(time).astype(np.int8)})
+        return times.assign(fell=happened(times.fall).where(~(times.fall <= times.time)))[["fell"]]
 
 
 def unless_refused(
@@ -235,26 +212,8 @@ def unless_refused(
     """
     import xarray as xr
 
-    everyone, alone = np.arange(n_starts), list[xr.Dataset]()
-    with suppress(*REFUSALS):
-        return walked(everyone)
-    for start in everyone[:, np.newaxis]:
-        try:
-            alone.append(walked(start))
-        except REFUSALS:
-            alone.append(over_start({name: np.array([np.nan]) for name in columns}, columns))
-    return xr.concat(alone, "start")
-
-
-def _check_settles(starts: np.ndarray, conditions: Conditions, stride: Stride, threads: int | None) -> None:
-    """Raise the first error if no start comes to rest."""
-    from hexmj.physics.settle import settle
-
-    failed = []
-    for start in starts:
-        try:
-            settle(start[np.newaxis], conditions, stride, threads)
-            return
-        except SimulationError as error:
-            failed.append(error)
-    raise failed[0]
+    everyone = np.arange(n_starts)
+    parts = [part.assign_coords(start=which) for which, part in by_halves(everyone, walked, diverging=True)]
+    if not parts:
+        return over_start({name: np.full(n_starts, np.nan) for name in columns}, columns)
+    return xr.concat(parts, "start").reindex(start=everyone)

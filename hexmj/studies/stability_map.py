@@ -1,8 +1,7 @@
 """Dynamic stability maps: physical FLSS over the velocity and one condition, with the same starts in every cell."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -10,17 +9,17 @@ import numpy as np
 from hexmj.conditions import Conditions
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller, FeedbackPlan
-from hexmj.errors import InputError, OutOfReach, SimulationError
+from hexmj.errors import InputError
 from hexmj.measures.compare import BESIDE, MEASURES
 from hexmj.measures.figures import caption
-from hexmj.measures.study import UNITS, Study, WalkSettings
+from hexmj.measures.study import UNITS, Study, WalkSettings, by_halves, standing_starts
 from hexmj.measures.tables import differences, frequency, happened, over_start, velocity_axis
 from hexmj.plotting import LEGEND, head, heat_map, picture, velocity_columns
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 from hexmj.studies.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
 from hexmj.sweep import Cell, over_axes
-from hexmj.timing import Acceleration, Stride
+from hexmj.timing import Acceleration
 from hexmj.validate import choice, distinct
 
 if TYPE_CHECKING:
@@ -178,7 +177,7 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
     """
     stands = standing_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
     blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
-    parts = [part for block in blocks for part in _by_halves(block, lambda which: _fates(walks, which, threads))]
+    parts = [part for block in blocks for part in by_halves(block, lambda which: _fates(walks, which, threads))]
     if not parts:
         value = walks.conditions.values()[over]
         raise InputError(f"{over} = {value:g}; no start stands and reaches its tips at V = {walks.velocity:g}")
@@ -187,29 +186,6 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
     return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(
         start=("start", within, {"units": "1"})
     )
-
-
-@lru_cache(maxsize=1)
-def standing_starts(
-    n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None
-) -> np.ndarray:
-    """Return the indices of the seed's starts that come to rest on six feet; cached for the other velocities."""
-    from hexmj.physics.settle import settle
-
-    starts, everyone = draw_starts(n_starts, seed, stride), np.arange(n_starts)
-    parts = [part for part, _ in _by_halves(everyone, lambda part: settle(starts[part], conditions, stride, threads))]
-    return np.concatenate([everyone[:0], *parts])
-
-
-def _by_halves(which: np.ndarray, walk: Callable[[np.ndarray], Any]) -> Iterator[tuple[np.ndarray, Any]]:
-    """Yield parts of the starts, (n,), with what they return; one that cannot stand or reach its tips is left out."""
-    try:
-        yield which, walk(which)
-    except (OutOfReach, SimulationError) as error:
-        if isinstance(error, SimulationError) and error.state:
-            raise  # it diverges
-        for half in np.array_split(which, 2) if len(which) > 1 else ():
-            yield from _by_halves(half, walk)
 
 
 def _fates(walks: WalkSettings, which: np.ndarray, threads: int | None) -> dict[str, np.ndarray]:

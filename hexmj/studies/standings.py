@@ -1,17 +1,17 @@
 """Standings of the league: frequencies with their intervals, differences, ranks, and the tables of all that."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from operator import attrgetter
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from hexmj.controllers.protocol import Controller
 from hexmj.io import markdown_table, settings
 from hexmj.measures.figures import network_rules, starts_in_words
-from hexmj.measures.tables import VELOCITY, differences, frequencies, happened, padded
+from hexmj.measures.tables import VELOCITY, differences, frequencies, happened, over_cells
 from hexmj.phases import circular_mean
 from hexmj.stats import paired_difference
-from hexmj.studies.league_cells import Entrant
+from hexmj.studies.league_cells import is_ideal
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,23 +33,27 @@ ABOUT_TRIALS = (
 )
 """Explanation of the trials."""
 
-Data = Mapping[tuple[str, str], "xr.Dataset"]
-"""Result of every cell by entrant and question."""
-
-Cells = Sequence[Sequence["xr.Dataset | None"]]
-"""Results by (entrant, question); None for a missing cell."""
-
 OVER_VELOCITY = ("entrant", "velocity")
 
 UNITS = {"slip": "mm/s", "reached": "time unit"}
 """Units of variables that are no frequency, rank, phase or ratio."""
 
+ASKED = ("lost", "fell", "reached", "stable", "duty_factor", "ipsilateral", "contralateral")
+"""Variables of cells that an entrant may not have."""
+
 REFERENCE = "ldvs"
 """Entrant that others are compared with; if it does not take part, the first one from random starts."""
 
 
-def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Data) -> "xr.Dataset":
+def standings(
+    entrants: Mapping[str, Controller], velocities: np.ndarray, data: Mapping[tuple[str, str], "xr.Dataset"]
+) -> "xr.Dataset":
     """Return the results of all cells of entrants at velocities V_r, (velocity,), as one dataset.
+
+    Args:
+        entrants: controllers by name.
+        velocities: (velocity,).
+        data: result of every cell by entrant and question.
 
     Returns:
         Over (entrant, velocity): `kinematic`, `measured` and `physical` FLSS with `_low`, `_high` (95 % Wilson), and
@@ -64,47 +68,54 @@ def standings(entrants: Mapping[str, Entrant], velocities: np.ndarray, data: Dat
     """
     import xarray as xr
 
-    names, lost = list(entrants), attrgetter("lost")
+    names, nothing = list(entrants), xr.Dataset(dict.fromkeys(ASKED, ("start", [])))
 
-    def cells(questions: Iterable[str]) -> Cells:
-        return [[data.get((name, question)) for question in questions] for name in names]
+    def cells(questions: Iterable[str], axis: str = "velocity") -> "xr.Dataset":
+        """Return what cells hold, over (entrant, question, start); NaN for a missing cell."""
+        asked = list(questions)
+        found = [data.get((name, question), nothing) for name in names for question in asked]
+        return over_cells({"entrant": len(names), axis: len(asked)}, found)
 
-    def events(cells: Cells, find: Callable[["xr.Dataset"], "xr.DataArray"]) -> np.ndarray:
-        """Return the events of each start, (entrant, question, start); NaN for a missing cell."""
-        return padded([[[] if cell is None else find(cell) for cell in row] for row in cells])
-
-    planned, walked, regimes = (
-        cells([f"{kind} {v}" for v in velocities.tolist()]) for kind in ("kinematic", "physics", "gait")
+    planned, walked, gaits = (
+        cells(f"{kind} {v}" for v in velocities.tolist()) for kind in ("kinematic", "physics", "gait")
     )
-    upright = [[None if cell is None else _upright(cell) for cell in row] for row in walked]
-    measures = {
-        "kinematic": events(planned, lost),
-        "measured": events(walked, lambda cell: happened(cell.measured_loss)),
-        "physical": events(walked, lambda cell: happened(cell.fall)),
-    }
-    random = [name for name, entrant in entrants.items() if not entrant.ideal]
+    events = {"kinematic": planned.lost, "measured": happened(walked.measured_loss), "physical": walked.fell}
+    ideal = np.array([is_ideal(*entrant) for entrant in entrants.items()])
+    random = [name for name, begins in zip(names, ideal, strict=True) if not begins]
     reference = REFERENCE if REFERENCE in random else next(iter(random), "")
-    ideal = np.array([entrant.ideal for entrant in entrants.values()])[:, None, None]
-    same = {measure: np.where(ideal, np.nan, values) for measure, values in measures.items()}  # the same random starts
     table: dict[str, Any] = {}
-    for measure, values in same.items():
-        table |= frequencies(measure, measures[measure], OVER_VELOCITY)
-        table |= differences(f"{measure}_above", values, values[names.index(reference or names[0])], OVER_VELOCITY)
-    for question in ("range", "accelerated"):
-        table |= frequencies(question, events(cells([question]), lost)[:, 0], OVER_VELOCITY[:1])
-    over_trials = "entrant", "trial"
-    table |= frequencies("fell", events(cells(TRIALS), _fell), over_trials)
-    table |= frequencies("lost", events(cells([f"kinematic, {trial}" for trial in TRIALS]), lost), over_trials)
-    best, worst = np.array([ranks(values.mean(axis=1)) for values in same.values()]).transpose(1, 2, 0)
+    places = []
+    for measure, values in events.items():
+        same = np.where(ideal[:, None, None], np.nan, values)  # on the same random starts
+        table |= frequencies(measure, values.values, OVER_VELOCITY)
+        table |= differences(f"{measure}_above", same, same[names.index(reference or names[0])], OVER_VELOCITY)
+        places.append(ranks(same.mean(axis=1)))
+    best, worst = np.transpose(places, (1, 2, 0))
     table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
-    table |= {name: _over(upright, find) for name, find in OF_WALKS.items()}
-    table["missing"] = _over(walked, lambda cell: cell.fall.isnull().sum())
-    table |= {name: _over(regimes, find) for name, find in OF_REGIMES.items()}
+    for question in ("range", "accelerated"):
+        table |= frequencies(question, cells([question]).lost.values[:, 0], OVER_VELOCITY[:1])
+    over_trials = "entrant", "trial"
+    table |= frequencies("fell", cells(TRIALS, "trial").fell.values, over_trials)
+    table |= frequencies("lost", cells([f"kinematic, {trial}" for trial in TRIALS], "trial").lost.values, over_trials)
+    upright = walked.where(np.isinf(walked.fall))
+    table |= {
+        "speed": upright.speed.mean("start"),
+        "slip": upright.slip.mean("start"),
+        "cost": upright.work.sum("start") / upright.way.sum("start"),
+        "torque": upright.torque.max("start"),
+        "missing": walked.missing.sum("start"),
+        "periodic": happened(gaits.reached).mean("start"),
+        "stable": gaits.stable.mean("start"),
+        "reached": gaits.reached.median("start"),
+        "duty_factor": gaits.duty_factor.mean("start"),
+    }
+    for phase in ("ipsilateral", "contralateral"):
+        table[phase] = OVER_VELOCITY, np.apply_along_axis(_phase, 2, gaits[phase].values)
     velocity = ("velocity", velocities, VELOCITY)
-    axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(measures)}
+    axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(events)}
     result = xr.Dataset(table, axes, {"reference": reference})
     for name, values in result.items():
-        values.attrs["units"] = UNITS.get(str(name), "1")
+        values.attrs = {"units": UNITS.get(str(name), "1")}
     return result
 
 
@@ -125,44 +136,10 @@ def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return best, worst
 
 
-def _upright(cell: "xr.Dataset") -> "xr.Dataset":
-    """Return the walks without a fall."""
-    return cell.isel(start=np.isinf(cell.fall.values))
-
-
-def _fell(cell: "xr.Dataset") -> "xr.DataArray":
-    """Return whether starts fell, from a disturbance or walks from the start on."""
-    return cell.fell if "fell" in cell else happened(cell.fall)
-
-
-OF_WALKS = {
-    "speed": lambda upright: upright.speed.mean(),
-    "slip": lambda upright: upright.slip.mean(),
-    "cost": lambda upright: upright.work.sum() / upright.way.sum(),
-    "torque": lambda upright: upright.torque.max() if upright.start.size else np.nan,
-}
-"""Numbers of the walks at one velocity that do not fall; NaN if all fall."""
-
-OF_REGIMES = {
-    "periodic": lambda cell: np.isfinite(cell.reached).mean(),
-    "stable": lambda cell: cell.stable.mean(),
-    "reached": lambda cell: cell.reached.median(),
-    "duty_factor": lambda cell: cell.duty_factor.mean(),
-    "ipsilateral": lambda cell: _phase(cell.ipsilateral),
-    "contralateral": lambda cell: _phase(cell.contralateral),
-}
-"""Numbers of the steady-state gaits at one velocity; duty factor and phases are NaN if none was reached."""
-
-
-def _phase(values: "xr.DataArray") -> float:
-    """Return the circular mean of known phases."""
-    known = values.values[np.isfinite(values.values)]
+def _phase(values: np.ndarray) -> float:
+    """Return the circular mean of known phases, (start,)."""
+    known = values[np.isfinite(values)]
     return float(circular_mean(known)) if len(known) else np.nan
-
-
-def _over(cells: Cells, find: Callable[["xr.Dataset"], Any]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return one number of each cell, (entrant, velocity); NaN for a missing cell."""
-    return OVER_VELOCITY, np.array([[np.nan if cell is None else float(find(cell)) for cell in row] for row in cells])
 
 
 LESS, MORE = "-", "+"
