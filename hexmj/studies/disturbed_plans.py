@@ -4,7 +4,7 @@ The legs go to the nearest of a small set of postures of undisturbed walking, wi
 alone do not keep a walk stable.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, cast
 
 import numpy as np
@@ -51,10 +51,6 @@ class Disturbance:
     leg: np.ndarray
     """(start,) index of the leg that kind 'leg' stops; if it stands, the next protracting leg is stopped."""
 
-    def of(self, which: np.ndarray) -> "Disturbance":
-        """Return the disturbance of some starts, (n,) indices."""
-        return replace(self, step=self.step[which], leg=self.leg[which])
-
     def awaited(self, standing: np.ndarray) -> np.ndarray:
         """Return which starts, (start,), wait for a protracting leg, from the states of the legs, (start, leg)."""
         return (self.kind == "leg") & np.all(standing, axis=1)
@@ -84,16 +80,6 @@ class Postures:
         return int(np.argmin(((self.tips - tips) ** 2).sum(axis=1)))
 
 
-@dataclass(frozen=True, eq=False)
-class Rest:
-    """Steps for which the body stands still."""
-
-    tips: np.ndarray
-    """(step, leg) after each step [mm]."""
-    standing: np.ndarray
-    """(step, leg)."""
-
-
 def collect_postures(controller: Controller, velocity: float, seed: int, stride: Stride) -> Postures:
     """Return statically stable postures, evenly spread over one period of a steady-state gait at this velocity.
 
@@ -113,29 +99,32 @@ def collect_postures(controller: Controller, velocity: float, seed: int, stride:
     return Postures(walk.x[rows, 0], walk.stance[rows, 0])
 
 
-def reorganise(tips: np.ndarray, goal: np.ndarray, stride: Stride) -> Rest:
-    """Return a rest in which one leg after the other moves from its tip to its goal, both (leg,) [mm], at V_p.
+def reorganise(tips: np.ndarray, goal: np.ndarray, stride: Stride) -> tuple[np.ndarray, np.ndarray]:
+    """Return tips [mm] and states, both (step, leg), while one leg after the other moves from its tip to its goal.
 
     The next leg is the one without which the others support the body best. Legs within one step of their goal stay.
+
+    Args:
+        tips: of the standing legs, (leg,) [mm].
+        goal: where they go at V_p, (leg,) [mm].
+        stride: with the time step and the lines of the tips.
     """
     now, left = tips.copy(), [int(leg) for leg in np.flatnonzero(np.abs(goal - tips) > stride.dt)]
     rows, states = [], []
+
+    def margin_without(leg: int) -> float:
+        feet = np.stack([now + np.array(stride.geometry.origin), np.array(stride.geometry.y)], axis=-1)
+        return float(stability_margin(feet, np.arange(6) != leg, threads=1))
+
     while left:
-        leg = max(left, key=lambda leg: _margin_without(leg, now, stride))
+        leg = max(left, key=margin_without)
         left.remove(leg)
         way = goal[leg] - now[leg]
         for n in range(int(np.ceil(abs(way) / stride.dt)) - 1, -1, -1):
             now[leg] = goal[leg] - np.sign(way) * n * stride.dt
             rows.append(now.copy())
             states.append((np.arange(6) != leg) | (n == 0))
-    return Rest(np.array(rows).reshape(-1, 6), np.array(states, dtype=bool).reshape(-1, 6))
-
-
-def _margin_without(leg: int, tips: np.ndarray, stride: Stride) -> float:
-    """Return the stability margin while one leg is up [mm]."""
-    geometry = stride.geometry
-    feet = np.stack([tips + np.array(geometry.origin), np.array(geometry.y)], axis=-1)
-    return float(stability_margin(feet, np.arange(6) != leg, threads=1))
+    return np.array(rows).reshape(-1, 6), np.array(states, dtype=bool).reshape(-1, 6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,13 +159,7 @@ class Disturbed:
         acceleration: Acceleration | None = None,
         threads: int | None = None,
     ) -> "DisturbedPlan":
-        """Return a plan, see `protocol.Controller.begin`.
-
-        Raises:
-            InputError: the controller's plans cannot be steered, or the disturbance is that of other starts.
-        """
-        if (count := len(self.disturbance.step)) != len(starts):
-            raise InputError(f"a disturbance of {count} starts; expected one of {len(starts)}")
+        """Return a plan, see `protocol.Controller.begin`."""
         arguments = self.controller, starts, velocity, stride, acceleration, threads
         plan = cast(SteerablePlan, begin(*arguments, at_speed=True))
         return DisturbedFeedbackPlan(self, plan) if isinstance(plan, FeedbackPlan) else DisturbedPlan(self, plan)
@@ -192,7 +175,7 @@ class DisturbedPlan(WrappedPlan):
         self._step, self._sensed = self._disturbance.step.copy(), False
         self.restart, self.slow_down = plan.restart, plan.slow_down
         self._stops = self._disturbance.kind == "halt" or self._postures is not None
-        self._rests: dict[int, Rest] = {}
+        self._rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # tips and states, (step, leg)
         self._tips, self._standing = np.array(self.starts), np.ones(self.starts.shape, dtype=bool)
         self._beside = np.tile(np.array(self.stride.geometry.y, dtype=float), (len(self.starts), 1))
         self._held = self._beside.copy()
@@ -234,14 +217,14 @@ class DisturbedPlan(WrappedPlan):
         self.resumed[which] = self.done
         steps = round(PAUSE / self.stride.dt)
         for start in np.flatnonzero(which & self._stops).tolist():
-            rest = Rest(np.tile(tips[start], (steps, 1)), np.ones((steps, 6), dtype=bool))
+            way, stands = np.tile(tips[start], (steps, 1)), np.ones((steps, 6), dtype=bool)
             if self._postures:
                 nearest = self._postures.nearest(tips[start])
-                moves = reorganise(tips[start], self._postures.tips[nearest], self.stride)
-                rest = Rest(np.concatenate([rest.tips, moves.tips]), np.concatenate([rest.standing, moves.standing]))
+                moved, moving = reorganise(tips[start], self._postures.tips[nearest], self.stride)
+                way, stands = np.concatenate([way, moved]), np.concatenate([stands, moving])
                 self._standing[start] = self._postures.standing[nearest]
-            self._rests[start], self._tips[start] = rest, rest.tips[-1]
-            self.resumed[start] += len(rest.tips)
+            self._rests[start], self._tips[start] = (way, stands), way[-1]
+            self.resumed[start] += len(way)
 
     def _resume(self, which: np.ndarray) -> None:
         """Let the plan of these starts, (start,), continue, or begin again after a rest."""
@@ -259,13 +242,13 @@ class DisturbedPlan(WrappedPlan):
         before = self.done
         walk = copied(self._plan.advance(steps))
         self.done, self._beside = self.done + steps, walk.y[-1].copy()
-        for start, rest in self._rests.items():
+        for start, (way, stands) in self._rests.items():
             if before < self.resumed[start]:
                 rows = slice(before - self._step[start], before - self._step[start] + steps)
                 walk.velocity[:, start] = 0.0
-                walk.x[:, start], walk.stance[:, start] = rest.tips[rows], rest.standing[rows]
+                walk.x[:, start], walk.stance[:, start] = way[rows], stands[rows]
                 walk.y[:, start], walk.height[:, start] = self._held[start], np.nan
-                back = np.diff(rest.tips, axis=0, prepend=rest.tips[:1]) < 0.0  # the end of such a swing is unknown
+                back = np.diff(way, axis=0, prepend=way[:1]) < 0.0  # the end of such a swing is unknown
                 walk.aep[:, start] = np.where(back[rows], np.nan, self.stride.aep0)
         return walk
 

@@ -15,8 +15,9 @@ from hexmj.controllers.planning import REPEATED, advanced, begin, check_repeats,
 from hexmj.controllers.protocol import Controller, SteerableController, check_steerable
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
+from hexmj.measures.tables import over_start
 from hexmj.starts import draw_starts
-from hexmj.studies.disturbed_plans import NEVER, Disturbance, Disturbed, Kind, Postures, collect_postures
+from hexmj.studies.disturbed_plans import Disturbance, Disturbed, Kind, Postures, collect_postures
 from hexmj.timing import Acceleration, Stride, steps_within
 
 if TYPE_CHECKING:
@@ -58,8 +59,8 @@ MOST_DRAWN = 200_000
 GRID = 20
 """Steps of which every time of a disturbance is a multiple: 25 ms at the default V_p, the duration of a push."""
 
-CHUNK, MOST_PERIODS = 50, 100
-"""Steps planned at a time, and most periods of a single leg, in the search for a protracting leg."""
+MOST_PERIODS = 3
+"""Most periods of a single leg in which a protracting leg is searched for."""
 
 
 class TooFewStable(InputError):
@@ -117,25 +118,18 @@ def disturbance_of(
     leg = np.zeros_like(stable.step)
     if kind != "leg":
         return Disturbance(kind, stable.step, leg)
-    plan, step = begin(controller, stable.starts, velocity, stride), np.full_like(leg, NEVER)
-    advanced(plan, int(stable.step.min()) - 1)
-    end = stable.step.max() + MOST_PERIODS * stride.periods(velocity) / stride.dt
-    while (step == NEVER).any():
-        if plan.done > end:
-            raise InputError(
-                f"disturbance = 'leg': no leg of {controller.name} protracts within {MOST_PERIODS} periods in"
-                f" {(step == NEVER).sum()} of {len(step)} starts"
-            )
-        first, every = plan.done + 1, np.arange(len(step))
-        up = ~advanced(plan, CHUNK).stance
-        due = (first + np.arange(CHUNK))[:, None] >= stable.step
-        row = np.argmax(up.any(axis=2) & due, axis=0)
-        legs = up[row, every]
-        found = (step == NEVER) & legs.any(axis=1) & due[row, every]
-        nth = np.floor(stable.draw * legs.sum(axis=1)).astype(int)
-        chosen = np.argmax(legs & (np.cumsum(legs, axis=1) == nth[:, None] + 1), axis=1)
-        step, leg = np.where(found, first + row, step), np.where(found, chosen, leg)
-    return Disturbance(kind, step, leg)
+    plan, first = begin(controller, stable.starts, velocity, stride), int(stable.step.min())
+    advanced(plan, first - 1)
+    end = int(stable.step.max() + stride.periods(velocity, MOST_PERIODS) / stride.dt)
+    up = ~advanced(plan, end - plan.done).stance  # (step, start, leg)
+    up &= (first + np.arange(len(up)))[:, None, None] >= stable.step[:, None]
+    row = np.argmax(up.any(axis=2), axis=0)
+    legs = up[row, np.arange(len(leg))]
+    if not legs.any(axis=1).all():
+        raise InputError(f"disturbance = 'leg': no leg of {controller.name} protracts within {MOST_PERIODS} periods")
+    nth = np.floor(stable.draw * legs.sum(axis=1)).astype(int)
+    chosen = np.argmax(legs & (np.cumsum(legs, axis=1) == nth[:, None] + 1), axis=1)
+    return Disturbance(kind, first + row, chosen)
 
 
 TIMES = {
@@ -206,8 +200,6 @@ class StableWalks:
             TooFewStable: too few starts are stable until they are disturbed.
             InputError, SimulationError: a walk fails.
         """
-        import xarray as xr
-
         from hexmj.measures.physical import outcomes_of_plan
         from hexmj.physics.pushes import Push
         from hexmj.physics.settle import settle
@@ -216,13 +208,13 @@ class StableWalks:
         disturbance = disturbance_of(self.found, case.kind, self.planner, self.velocity, self.stride)
         postures = self.postures if case.strategy == "reorganise" else None
         disturbed = Disturbed(self.planner, disturbance, postures, slows=recovery is not None)
-        check_repeats(disturbed, self.found.starts, self.velocity, REPEATED, self.stride, recovery)
         ahead: Any = begin(disturbed, self.found.starts, self.velocity, self.stride, recovery, threads)
         advanced(ahead, int(disturbance.step.max()) + 1)
         back = ahead.resumed * self.stride.dt + (recovery.duration(self.velocity) if recovery else 0.0)
         end = float(back.max() + observation_time)
-        starts, disturbed = self.found.starts[which], replace(disturbed, disturbance=disturbance.of(which))
-        time = disturbed.disturbance.step * self.stride.dt
+        disturbance = replace(disturbance, step=disturbance.step[which], leg=disturbance.leg[which])
+        starts, disturbed = self.found.starts[which], replace(disturbed, disturbance=disturbance)
+        time = disturbance.step * self.stride.dt
         plan = begin(disturbed, starts, self.velocity, self.stride, recovery, threads)
         first = planned_losses(plan, steps_within(end, self.stride), threads)
         lost = np.where(first > 0, first * self.stride.dt, np.inf)
@@ -233,7 +225,7 @@ class StableWalks:
             walks = SensoryFeedback(disturbed) if isinstance(self.controller, SensoryFeedback) else disturbed
             plan = begin(walks, starts, self.velocity, self.stride, recovery, threads=1)
             times["fall"] = outcomes_of_plan(settled, plan, end, lost, push=push, threads=threads).fall
-        columns = {
-            name: ("start", values, {"units": "time unit", "long_name": TIMES[name]}) for name, values in times.items()
-        }
-        return xr.Dataset(columns).assign(drawn=self.found.drawn)
+        table = over_start(times, dict.fromkeys(TIMES, "time unit"))
+        for name, values in table.items():
+            values.attrs["long_name"] = TIMES[str(name)]
+        return table.assign(drawn=self.found.drawn)
