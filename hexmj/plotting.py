@@ -1,8 +1,7 @@
 """Figures: those that belong to results, and what they share. Figures are made without pyplot."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
 from importlib import import_module
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -62,6 +61,9 @@ SERIES: tuple[dict[str, Any], ...] = (
 VELOCITY = "velocity $V_r / V_p$"
 """Label of an axis of velocities."""
 
+FEWER, NOTHING = "\N{BULLET}", "\N{EN DASH}"
+"""Marks of a cell of a heat map with missing walks, and of one without a number."""
+
 LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9}
 """Options of a legend."""
 
@@ -97,20 +99,17 @@ def as_shipped() -> Iterator[None]:
 
 def picture(width: float, height: float) -> "Figure":
     """Return an empty figure of a size in inches, which notebooks show, and whose parts make room for each other."""
-    return _picture_type()(figsize=(width, height), layout="constrained")
-
-
-@cache
-def _picture_type() -> "type[Figure]":
     from matplotlib.figure import Figure
 
-    class Picture(Figure):
-        def _repr_png_(self) -> bytes:
-            drawn = BytesIO()
-            self.savefig(drawn, format="png", dpi=100)
-            return drawn.getvalue()
+    figure: Any = Figure(figsize=(width, height), layout="constrained")
 
-    return Picture
+    def png() -> bytes:
+        drawn = BytesIO()
+        figure.savefig(drawn, format="png", dpi=100)
+        return drawn.getvalue()
+
+    figure._repr_png_ = png
+    return figure
 
 
 def head(figure: "Figure", *lines: str) -> None:
@@ -129,30 +128,17 @@ def tidy(axes: "Axes") -> None:
     axes.grid(color="0.9", linewidth=0.8)
 
 
-def velocity_ticks(axes: "Axes", velocities: Sequence[float] | np.ndarray) -> None:
-    """Put ticks at the velocities, unless they are too many to be read."""
-    if len(velocities) <= MOST_TICKS:
-        axes.set_xticks(velocities, [f"{v:g}" for v in velocities])
-
-
 def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
     """Set up axes of FLSS against velocity."""
     low, high = max(-BESIDE, velocities.min() - 0.1), min(1.0 + BESIDE, velocities.max() + 0.1)
     axes.set(xlabel=VELOCITY, xlim=(low, high), ylabel="FLSS", ylim=(-0.02, 1.02))
-    velocity_ticks(axes, velocities)
+    if len(velocities) <= MOST_TICKS:
+        axes.set_xticks(velocities, [f"{v:g}" for v in velocities])
     tidy(axes)
 
 
 def frequency_curve(axes: "Axes", x: "np.ndarray | xr.DataArray", data: "xr.Dataset", name: str, **style: Any) -> None:
-    """Draw a frequency with its interval against x.
-
-    Args:
-        axes: to draw in.
-        x: (n,).
-        data: holds `name`, `name_low` and `name_high`, (n,) each.
-        name: of the frequency.
-        style: options of `Axes.errorbar`.
-    """
+    """Draw a frequency and its interval, `name`, `name_low` and `name_high`, against x, all (n,)."""
     axes.errorbar(x, *interval(data, name), **CURVE | style)
 
 

@@ -12,7 +12,8 @@ from hexmj.controllers.cruse1998 import network_toml
 from hexmj.controllers.cruse1998.weights import general
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
-from hexmj.studies.ablation import FEWER, NONE, Ablation, ablation_figure, switched, wholes
+from hexmj.plotting import FEWER, NOTHING
+from hexmj.studies.ablation import Ablation, ablation_figure, switched, wholes
 from hexmj.sweep import run_study
 
 
@@ -63,7 +64,7 @@ def test_differences_are_those_to_the_whole_on_the_same_starts() -> None:
     assert one.more_low < one.more < one.more_high
     assert len(ablation_figure(result).axes) == 4
     at = {"controller": "walknet-without-1", "measure": "physical"}
-    for starts, mark in ((1, FEWER), (0, NONE)):  # missing walks have a mark, never nan
+    for starts, mark in ((1, FEWER), (0, NOTHING)):  # missing walks have a mark, never nan
         changed = result.copy(deep=True)
         changed.frequency_starts.loc[at] = starts
         for name in ("frequency", "more", "more_low", "more_high") if not starts else ():
@@ -109,4 +110,4 @@ def test_other_model_variants_are_named_in_the_title() -> None:
     study = Ablation(wholes(["lasting", "walknet"]), (0.5,), n_starts=2, physical_starts=1, periods=12)
     lost = xr.Dataset(dict.fromkeys(("lost", "fell", "stable"), ("start", [0, 1])))
     result = study.result([lost for _ in study.cells()])
-    assert "lasting: lasting" in hexmj.plot(result).get_suptitle()
+    assert "lasting (model variant lasting)" in hexmj.plot(result).get_suptitle()

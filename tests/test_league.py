@@ -20,11 +20,12 @@ from hexmj.measures.kinematic import first_loss, flss, flss_over_range
 from hexmj.measures.physical import physical_walk
 from hexmj.measures.tables import frequencies, happened
 from hexmj.physics.settle import settle
+from hexmj.plotting import FEWER, NOTHING
 from hexmj.starts import draw_starts
 from hexmj.stats import paired_difference
 from hexmj.studies.league import League
 from hexmj.studies.league_cells import EVERYONE, EntrantWalks, entrants, is_ideal, short_names, unless_refused
-from hexmj.studies.league_figure import FEWER, NOTHING, league_figure, walks_figure
+from hexmj.studies.league_figure import league_figure, walks_figure
 from hexmj.studies.standings import TRIALS, by_rank, league_markdown, ranks, tables
 from hexmj.sweep import run_cells
 from hexmj.timing import Stride

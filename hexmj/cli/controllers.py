@@ -115,8 +115,6 @@ class Ablate(StudyCommand):
         return build(Ablation, given, controllers=wholes(given.controller))
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        from hexmj.io import settings
-        from hexmj.measures.figures import not_printed
         from hexmj.studies.ablation import MEASURES
 
         for measure, title in MEASURES.items():
@@ -129,8 +127,6 @@ class Ablate(StudyCommand):
                 for name in result.controller.values
             ]
             yield from tables_that_fit(("controller", *(f"V = {v:g}" for v in velocities)), rows)
-        rules = not_printed(settings(result)["controllers"])
-        yield from (f"{words}: {', '.join(names)}" for words, names in rules.items())
 
 
 def _ablated(data: "xr.Dataset") -> str:

@@ -28,16 +28,17 @@ SYMBOLS = {"vp": "$V_p$", "aep0": "AEP$_0$", "pep0": "PEP$_0$", "pep_min": "PEP_
 """Their names in a caption, where these differ."""
 
 FEW = 3
-"""Most controllers that a caption names."""
+"""Most controllers that a caption names, unless they do not plan as printed in 1998."""
 
 COLUMNS = 3
 """Most panels beside each other."""
 
 
-def caption(result: "xr.Dataset") -> str:
+def caption(result: "xr.Dataset", least: int | None = None) -> str:
     """Return a line for a figure's title: controllers, starts, observation time, V_p, and other settings.
 
-    Fields of the stride and conditions appear if they are not defaults.
+    Fields of the stride and conditions appear if they are not defaults. So does the `least` number of starts that a
+    frequency counts, if that is not all.
     """
     made = settings(result)
     words = [_controllers(made.get("controllers", {}), result)]
@@ -57,27 +58,14 @@ def caption(result: "xr.Dataset") -> str:
         given = made.get("conditions") or {}
         shown = {"vp", *unusual(given)}
         words.append(", ".join(_term(name, value) for name, value in given.items() if name in shown))
+    if least not in (None, result.attrs.get("starts")):
+        words.append(f"frequencies of at least {least} of them")
     return "; ".join(filter(None, words))
-
-
-def caption_of_at_least(least: int, result: "xr.Dataset") -> str:
-    """Return the caption with the least number of starts that a frequency counts, if that is not all."""
-    more = "" if least == result.attrs.get("starts") else f"; frequencies of at least {least} of them"
-    return caption(result) + more
 
 
 def starts_in_words(number: int) -> str:
     """Return a number of starts as a text."""
     return "1 start" if number == 1 else f"{number} starts"
-
-
-def not_printed(controllers: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Return the networks that do not plan as printed in 1998: rules -> names, from settings by name."""
-    found: dict[str, list[str]] = {}
-    for name, controller in controllers.items():
-        if words := network_rules(controller):
-            found.setdefault(words, []).append(name)
-    return found
 
 
 def network_rules(controller: Any) -> str:
@@ -103,7 +91,7 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
     columns = min(COLUMNS, len(names))
     rows = -(-len(names) // columns)
     figure = picture(max(5.6, 3.4 * columns), 1.3 + 2.7 * rows)
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    panels = figure.subplots(rows, columns, squeeze=False)
     shifts = np.linspace(-0.5, 0.5, len(MEASURE_STYLES)) * BESIDE
     for axes, name in zip(panels.ravel(), names, strict=False):
         data = result.sel(controller=name).sortby("velocity")
@@ -111,11 +99,8 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
             frequency_curve(axes, data.velocity + shift, data, measure, label=measure, **{"markersize": 4.5} | style)
         axes.set_title(in_figure(name), fontsize=10)
         flss_axes(axes, result.velocity.values)
-    for n, axes in enumerate(panels.ravel()):
-        axes.set_visible(n < len(names))
-        lowest = n + columns >= len(names)
-        axes.tick_params(labelbottom=lowest)
-        axes.set(xlabel=axes.get_xlabel() if lowest else "", ylabel="" if n % columns else "FLSS")
+    for axes in panels.ravel()[len(names) :]:
+        axes.set_visible(False)
     handles, _ = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=len(handles))
     head(figure, "Loss of static stability: kinematic, and measured under the feet; physical: falls", caption(result))
@@ -136,11 +121,8 @@ def _controllers(controllers: Mapping[str, Any], result: "xr.Dataset") -> str:
     """Return the names of a few controllers with what is not as printed in 1998, or only the latter for many."""
     if axis := [result[name].values for name in ("controller", "entrant") if name in result.coords]:
         controllers = {name: controllers[name] for name in np.ravel(axis[0]).tolist() if name in controllers}
-    if len(controllers) > FEW:
-        rules = not_printed(controllers)
-        return "; ".join(f"{words}: {', '.join(map(in_figure, names))}" for words, names in rules.items())
-    rules = {name: network_rules(controller) for name, controller in controllers.items()}
-    return ", ".join(in_figure(name) + (f" ({words})" if words else "") for name, words in rules.items())
+    few, rules = len(controllers) <= FEW, {name: network_rules(controllers[name]) for name in controllers}
+    return ", ".join(in_figure(name) + f" ({words})" * bool(words) for name, words in rules.items() if words or few)
 
 
 def _term(name: str, value: Any) -> str:

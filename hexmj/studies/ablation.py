@@ -13,7 +13,7 @@ from hexmj.controllers.registry import VARIED, load_controller
 from hexmj.errors import InputError
 from hexmj.measures.figures import caption
 from hexmj.measures.tables import differences, frequencies, over_cells, velocity_axis
-from hexmj.plotting import head, heat_map, in_figure, picture, velocity_columns
+from hexmj.plotting import FEWER, NOTHING, head, heat_map, in_figure, picture, velocity_columns
 from hexmj.studies.league import REGIMES
 from hexmj.studies.league_cells import ControllerStudy, EntrantWalks, short_names
 from hexmj.sweep import Cell
@@ -35,8 +35,7 @@ MEASURES = {
 }
 """Measure -> the event that is counted."""
 
-NONE, FEWER = "\N{EN DASH}", "\N{BULLET}"
-NOTES = {NONE: "no walk is left", FEWER: "walks are missing that diverged or were out of reach"}
+NOTES = {NOTHING: "no walk is left", FEWER: "walks are missing that diverged or were out of reach"}
 """Marks of a cell without a number, and of one with missing walks -> their meaning."""
 
 
@@ -158,7 +157,7 @@ def cell_text(cell: "xr.Dataset") -> tuple[str, bool]:
     whole = cell.controller.item() == cell.whole.item()
     value = (cell.frequency if whole else cell.more).item()
     if np.isnan(value):
-        return NONE, False
+        return NOTHING, False
     text = f"{value:.2f}" if whole else f"{np.round(value, 2) + 0.0:+.2f}".replace("-", "\N{MINUS SIGN}")
     fewer = cell.measure.item() == "physical" and cell.frequency_starts.item() < cell.attrs["physical_starts"]
     sure = whole or cell.more_low.item() > 0 or cell.more_high.item() < 0

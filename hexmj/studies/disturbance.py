@@ -14,7 +14,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.io import settings
-from hexmj.measures.figures import caption_of_at_least
+from hexmj.measures.figures import caption
 from hexmj.measures.study import Study
 from hexmj.measures.tables import differences, frequency, velocity_axis
 from hexmj.plotting import LEGEND, SERIES, flss_axes, frequency_curve, head, picture
@@ -243,8 +243,8 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
     entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
     least = min(int(data[f"{measure}_reached"].min()) for measure in measures)
     figure.legend(handles=entries, **LEGEND, loc="outside right center", title="strategy")
-    caption = "; ".join(filter(None, [caption_of_at_least(least, result), strategies_in_words(result)]))
-    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", caption)
+    words = "; ".join(filter(None, [caption(result, least), strategies_in_words(result)]))
+    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", words)
     return figure
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hexmj.measures.figures import caption, starts_in_words
-from hexmj.plotting import head, heat_map, in_figure, interval, picture, velocity_columns
+from hexmj.plotting import FEWER, NOTHING, head, heat_map, in_figure, interval, picture, velocity_columns
 from hexmj.studies.standings import MEASURES, by_rank, from_one, place
 
 if TYPE_CHECKING:
@@ -14,17 +14,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
-SHARES = (0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
-"""Between these shares a colour is the same."""
+COLUMNS = 4
+"""Panels of a figure."""
 
-PHASES = (*np.arange(-1, 26, 2) / 24,)
-"""The same for phases: twelfths of a cycle lie in the middle of a colour."""
+SHARE: dict[str, Any] = {"vmin": 0.0, "vmax": 1.0}
+"""Ends of the colours of shares and phases."""
 
-FEWER, NOTHING = "\N{BULLET}", "\N{EN DASH}"
-"""Marks of a cell with missing walks, and of one without a number."""
-
-BAR_HEIGHT = 0.25
-"""Height of the place of a colour bar [inch]."""
+BAR: dict[str, Any] = {"format": "%g", "fraction": 0.03}
+"""Options of a colour bar."""
 
 NAMED = 6
 """Most entrants that a note names."""
@@ -41,12 +38,9 @@ class Panel(NamedTuple):
     """(entrant, column)."""
     colours: str
     """Name of a colour map of matplotlib."""
-    levels: tuple[float, ...]
-    """Between which a colour is the same."""
     fewer: np.ndarray | bool = False
     """Where walks are missing, (entrant, column), if any are."""
-    label: str = "share of the starts"
-    """Label of the colour bar."""
+    ends: dict[str, Any] = SHARE
 
 
 def league_figure(result: "xr.Dataset") -> "Figure":
@@ -57,10 +51,10 @@ def league_figure(result: "xr.Dataset") -> "Figure":
     panels = []
     for name, title in titles.items():
         starts, fewer = starts_in_words(shown[f"{name}_starts"].max().item()), name != "kinematic" and missing
-        panels.append(Panel(f"{title}\n{starts}", shown[name].values, "YlOrRd", SHARES, fewer))
+        panels.append(Panel(f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer))
     heading = "The league: who loses static stability, and who falls; best in physics first, with the ranks there"
-    figure, axes, images = _drawn(heading, result, panels, [in_figure(from_one(shown))], (1.0, 1.0, 1.0, 0.95))
-    _colour_bar(axes[:3], images[0], panels[0], aspect=55, shrink=0.7)
+    figure, axes, images = _drawn(heading, shown, panels, [in_figure(from_one(shown))])
+    figure.colorbar(images[0], ax=axes[:3], location="bottom", label="share of the starts", **BAR, aspect=55)
     _dots(axes[3], shown)
     return figure
 
@@ -68,20 +62,20 @@ def league_figure(result: "xr.Dataset") -> "Figure":
 def walks_figure(result: "xr.Dataset") -> "Figure":
     """Draw falls in trials, steady-state gaits and costs, the best in physics at the top."""
     shown = by_rank(result)
-    few, missing, cost = shown.fell_starts.values, shown.missing.values > 0, shown.cost.values
+    few, missing = shown.fell_starts.values, shown.missing.values > 0
     some_are = (few > 0) & (few < few.max())
     trials = f"falls in trials at V = {result.attrs['trial_velocity']:g}\n{starts_in_words(few.max())}"
     panels = [
-        Panel(trials, shown.fell.values, "YlOrRd", SHARES, some_are),
-        Panel("steady-state gaits that\nare statically stable", shown.stable.values, "YlGn", SHARES),
-        Panel("ipsilateral phase\nof the gaits", shown.ipsilateral.values, "twilight", PHASES, label="phase"),
-        Panel("cost of transport\nof walks without a fall", cost, "PuBu", _round_levels(cost), missing, label=""),
+        Panel(trials, shown.fell.values, "YlOrRd", some_are),
+        Panel("steady-state gaits that\nare statically stable", shown.stable.values, "YlGn"),
+        Panel("ipsilateral phase\nof the gaits", shown.ipsilateral.values, "twilight"),
+        Panel("cost of transport\nof walks without a fall", shown.cost.values, "PuBu", missing, {}),
     ]
     heading = "The league: trials, steady-state gaits and costs; best in physics first"
     unstable = f"{FEWER} among the trials: of fewer starts; plans not stable until halt, leg or push, or walks missing"
-    figure, axes, images = _drawn(heading, result, panels, [unstable] * bool(some_are.any()), (1.33, 1.0, 1.0, 1.0))
-    for ax, panel, image in zip(axes, panels, images, strict=True):
-        _colour_bar(ax, image, panel, aspect=23)
+    figure, axes, images = _drawn(heading, shown, panels, [unstable] * bool(some_are.any()))
+    for ax, image in zip(axes, images, strict=True):
+        figure.colorbar(image, ax=ax, location="bottom", **BAR, aspect=23).ax.locator_params(nbins=4)
     turned: dict[str, Any] = {"rotation": 60, "ha": "right", "rotation_mode": "anchor", "fontsize": 8}
     axes[0].set_xticks(range(shown.sizes["trial"]), shown.trial.values, **turned)
     axes[0].set_xlabel("")
@@ -89,56 +83,29 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
 
 
 def _drawn(
-    heading: str, result: "xr.Dataset", panels: list[Panel], notes: list[str], widths: tuple[float, ...]
+    heading: str, shown: "xr.Dataset", panels: list[Panel], notes: list[str]
 ) -> "tuple[Figure, Any, list[AxesImage]]":
     """Return a figure with a row for each entrant, its axes, and the heat maps in the first ones.
 
     The meaning of the marks stands below the panels: a dash for no number, and a bullet for missing walks.
     """
-    import matplotlib
-    from matplotlib.colors import BoundaryNorm
-
-    shown = by_rank(result)
     rows, images = shown.sizes["entrant"], []
     figure = picture(11.0, 2.6 + 0.22 * rows)
-    axes = figure.subplots(1, len(widths), sharey=True, width_ratios=widths)
+    axes = figure.subplots(1, COLUMNS, sharey=True)
     for ax, panel in zip(axes, panels, strict=False):
-        colours = matplotlib.colormaps[panel.colours].with_extremes(bad="0.93")
         marks = np.where(np.isfinite(panel.values), np.where(panel.fewer, FEWER, ""), NOTHING)
-        images.append(heat_map(ax, panel.values, marks, cmap=colours, norm=BoundaryNorm(panel.levels, colours.N)))
-        for edge in range(1, rows):
-            ax.axhline(edge - 0.5, color="white", linewidth=0.6)
+        images.append(heat_map(ax, panel.values, marks, cmap=panel.colours, **panel.ends))
         ax.set_title(panel.title, fontsize=10)
         velocity_columns(ax, shown.velocity.values)
     ranks = [place(shown.isel(entrant=row).sel(measure="physical")) for row in range(rows)]
     names = [f"{in_figure(name)}{rank}" for name, rank in zip(shown.entrant.values, ranks, strict=True)]
     axes[0].set_yticks(range(rows), names, fontsize=9)
     axes[0].set_ylim(rows - 0.5, -0.5)
-    head(figure, heading, caption(result))
+    head(figure, heading, caption(shown))
     unknown = any(np.isnan(panel.values).any() for panel in panels)
     dash = [f"{NOTHING} not tried, or no walk or gait is left"] * unknown
     figure.supxlabel("\n".join(filter(None, [*notes, *dash, _missing(shown)])), fontsize=8)
     return figure, axes, images
-
-
-def _colour_bar(axes: Any, image: "AxesImage", panel: Panel, **options: Any) -> None:
-    """Draw the scale of a heat map below its panels."""
-    figure: Any = image.figure
-    height = BAR_HEIGHT / figure.get_figheight()
-    bar = figure.colorbar(image, ax=axes, location="bottom", format="%g", fraction=height, **options)
-    bar.ax.tick_params(labelsize=7)
-    bar.set_label(panel.label, fontsize=9)
-    if panel.levels == PHASES:
-        bar.set_ticks([0.0, 0.25, 0.5, 0.75, 1.0])
-
-
-def _round_levels(values: np.ndarray) -> tuple[float, ...]:
-    """Return a few round numbers around all values."""
-    from matplotlib.ticker import MaxNLocator
-
-    known = values[np.isfinite(values)]
-    ends = (known.min(), known.max()) if known.size else (0.0, 1.0)
-    return (*MaxNLocator(6, min_n_ticks=2).tick_values(ends[0], max(ends[1], ends[0] + 0.1)),)
 
 
 def _missing(shown: "xr.Dataset") -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
-from hexmj.measures.figures import caption_of_at_least
+from hexmj.measures.figures import caption
 from hexmj.measures.study import Study, outcome_table
 from hexmj.measures.tables import VELOCITY, reach
 from hexmj.plotting import LEGEND, SERIES, frequency_curve, head, picture, tidy
@@ -185,5 +185,5 @@ def terrain_figure(result: "xr.Dataset") -> "Figure":
     handles, _ = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=min(5, len(handles)))
     title = "Falls once the obstacle has been reached, with 95 % intervals"
-    head(figure, title, caption_of_at_least(int(result.reached.min()), result))
+    head(figure, title, caption(result, int(result.reached.min())))
     return figure
