@@ -15,6 +15,7 @@ from hexmj import LDVS, UNCOORDINATED, Conditions, InputError, draw_starts
 from hexmj.body import STICK_INSECT
 from hexmj.controllers.planning import begin
 from hexmj.legs import MIRROR
+from hexmj.measures.study import WalkSettings
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, Settling
 from hexmj.studies.biology import ANIMALS, PAST, SOURCES, SPEEDS, STEP, Animal, Biology, biology_figure, timing
@@ -56,7 +57,8 @@ def seen(starts: np.ndarray, velocity: float, duration: float) -> tuple[Strides,
 def walking() -> tuple[dict[int, Strides], list[dict[str, float]]]:
     """The strides of three starts after three periods, and their quantities."""
     settled = settle(draw_starts(3, 0))
-    strides = dict(last_strides(settled, LDVS, 0.3, 6 * PERIOD, 3 * PERIOD))
+    walks = WalkSettings(LDVS, 0.3, 6 * PERIOD, 3, 0, Conditions(), Stride())
+    strides = dict(last_strides(settled, walks, 3 * PERIOD))
     return strides, [quantities(one, settled.compiled) for one in strides.values()]
 
 

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import KinematicFlss, first_loss, flss, flss_over_range, losses_of_range
+from hexmj.measures.study import WalkSettings
 from hexmj.starts import SLAB, draw_slabs, draw_start, draw_starts
 from hexmj.stats import wilson_interval
 from hexmj.sweep import run_cells, run_study
@@ -116,7 +118,7 @@ def test_ranges_of_one_stream_never_overlap():
         assert np.array_equal(
             np.concatenate([*draw_slabs(n_starts, 4, Stride(), first)]), draw_starts(2500, 4)[first:][:n_starts]
         )
-        one = losses_of_range(LDVS, 0.6, 40.0, first, n_starts, seed=4, stride=Stride())
+        one = losses_of_range(WalkSettings(LDVS, 0.6, 40.0, n_starts, 4, Conditions(), Stride()), first)
         inside = (np.arange(2500) >= first) & (np.arange(2500) < first + n_starts)
         samples = np.add.reduceat(lost & inside, [0, 1000, 2000], dtype=int)
         held = slice(first // 1000, (first + n_starts - 1) // 1000 + 1)

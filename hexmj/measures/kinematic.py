@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.conditions import Conditions
 from hexmj.controllers.planning import advanced, begin, check_velocities, first_losses
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.io import attributes
+from hexmj.measures.study import WalkSettings
 from hexmj.measures.tables import frequency_table, losses_by_sample, observed, settings
 from hexmj.progress import Progress
 from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs
@@ -126,17 +128,15 @@ class KinematicFlss:
 
     def cells(self) -> list[Cell]:
         """Return the cells, each a `losses_of_range`."""
-        v, duration = self.observed
         check_velocities(self.controller, self.velocities, self.stride, self.acceleration)
-        same = {name: getattr(self, name) for name in ("controller", "seed", "stride", "acceleration")}
-
-        def cell(i: int, first: int) -> Cell:
-            count = min(self.range_of, self.n_starts - first)
-            own = {"velocity": v[i], "duration": duration[i], "first": first, "n_starts": count}
-            name = f"{self.controller.name}-V-{v[i]:g}-from-{first}"
-            return Cell(name, losses_of_range, same | own, work=duration[i] * count)
-
-        return [cell(*place) for place in self.places]
+        cells = []
+        for i, first in self.places:
+            (v, duration), count = np.transpose(self.observed)[i], min(self.range_of, self.n_starts - first)
+            same = self.seed, Conditions(), self.stride, self.acceleration
+            settings = {"walks": WalkSettings(self.controller, v, duration, count, *same), "first": first}
+            name = f"{self.controller.name}-V-{v:g}-from-{first}"
+            cells.append(Cell(name, losses_of_range, settings, work=duration * count))
+        return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the table of `flss`."""
@@ -150,17 +150,7 @@ class KinematicFlss:
 
 
 def losses_of_range(
-    controller: Controller,
-    velocity: float,
-    duration: float,
-    first: int,
-    n_starts: int,
-    *,
-    seed: int,
-    stride: Stride,
-    acceleration: Acceleration | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    walks: WalkSettings, first: int, threads: int | None = None, progress: Progress | None = None
 ) -> "xr.Dataset":
     """Count the starts from `first` on that lose static stability, a slab at a time.
 
@@ -170,14 +160,15 @@ def losses_of_range(
     import xarray as xr
 
     begin = first // SAMPLE
-    losses = np.zeros(math.ceil((first + n_starts) / SAMPLE) - begin, dtype=int)
-    for x in draw_slabs(n_starts, seed, stride, first):
-        times = first_loss(x, controller, velocity, duration, stride=stride, acceleration=acceleration, threads=threads)
+    losses = np.zeros(math.ceil((first + walks.n_starts) / SAMPLE) - begin, dtype=int)
+    how: Any = {"stride": walks.stride, "acceleration": walks.acceleration, "threads": threads}
+    for x in draw_slabs(walks.n_starts, walks.seed, walks.stride, first):
+        times = first_loss(x, walks.controller, walks.velocity, walks.duration, **how)
         count = losses_by_sample(np.isfinite(times)[None], first)[0]
         losses[first // SAMPLE - begin :][: len(count)] += count
         first += len(x)
         if progress:
-            progress(len(x) / n_starts)
+            progress(len(x) / walks.n_starts)
     return xr.Dataset({"losses": ("sample", losses, {"units": "1", "long_name": "starts that lose static stability"})})
 
 

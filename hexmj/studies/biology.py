@@ -6,7 +6,7 @@ Ranges are those of the sources, which say how words were read; NaN stands where
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -141,11 +141,15 @@ SPEEDS = tuple(sorted({row.speed for row in ANIMALS}))
 MEASURED = 3
 """Periods of a single leg at the end of a walk that are measured, as far as they are whole strides."""
 
+FIELDS = {"quantity": "name", "speed": "at", "low": "animal_low", "high": "animal_high"}
+"""Field of `Animal` -> its name in the result, where they differ."""
+
 HEADS = ("quantity", "ours (95 %)", "insects", "verdict on the mean", "source")
 """Heads of the table."""
 
-OURS, INSECTS = "#1b6ca8", "#e08e1b"
-"""Colours of a figure."""
+OURS: dict[str, Any] = CURVE | {"color": "#1b6ca8"}
+INSECTS = "#e08e1b"
+"""Style of the model, and colour of the insects' ranges."""
 
 OVER_SPEED = {
     "phase, ipsilateral": "ipsilateral phase",
@@ -211,11 +215,9 @@ class Biology(Study):
         table = xr.concat(list(data), "speed").assign_coords(speed=("speed", list(SPEEDS), {"units": "mm/s"}))
         values = [table.value.sel(speed=row.speed, quantity=row.quantity).values for row in ANIMALS]
         ours = [_mean(starts, row.quantity) for starts, row in zip(values, ANIMALS, strict=True)]
-        fields = {"name": "quantity", "at": "speed", "animal_low": "low", "animal_high": "high"}
-        fields |= {name: name for name in ("depends", "built_in", "source")}
         columns = {
             "unit": [UNITS[row.quantity] for row in ANIMALS],
-            **{name: [getattr(row, field) for row in ANIMALS] for name, field in fields.items()},
+            **{FIELDS.get(name, name): [getattr(row, name) for row in ANIMALS] for name in vars(ANIMALS[0])},
             **dict(zip(("mean", "low", "high"), np.transpose(ours), strict=True)),
             "verdict": [row.verdict(mean) for row, (mean, _, _) in zip(ANIMALS, ours, strict=True)],
             "walked": [np.count_nonzero(np.isfinite(starts)) for starts in values],
@@ -239,15 +241,11 @@ def _mean(values: np.ndarray, quantity: str) -> tuple[float, float, float]:
     return middle, middle - half, middle + half
 
 
-def walked(result: "xr.Dataset") -> dict[float, int]:
-    """Return the number of starts that walked whole strides at each speed [mm/s]."""
-    count = result.value.sel(quantity="speed").notnull().sum("start")
-    return dict(zip(result.speed.values.tolist(), count.values.tolist(), strict=True))
-
-
 def walked_in_words(result: "xr.Dataset") -> str:
-    """Return `walked` as a text."""
-    return ", ".join(f"{n} of {result.sizes['start']} at {speed:g} mm/s" for speed, n in walked(result).items())
+    """Return the number of starts that walked whole strides at each speed as a text."""
+    count = result.value.sel(quantity="speed").notnull().sum("start").values
+    numbers = zip(count, result.speed.values, strict=True)
+    return ", ".join(f"{n} of {result.sizes['start']} at {speed:g} mm/s" for n, speed in numbers)
 
 
 def table_rows(result: "xr.Dataset") -> Iterator[tuple[str, ...]]:
@@ -284,33 +282,29 @@ def biology_figure(result: "xr.Dataset") -> "Figure":
     figure = picture(11.0, 6.4)
     axes = figure.subplots(2, 3).ravel()
     for panel, (label, names) in zip(axes[:2], BARS.items(), strict=True):
-        _bars(panel, result.value.sel(speed=SPEED), names)
+        _bars(panel, result.value.sel(speed=SPEED).transpose("quantity", "start"), names)
         panel.set_ylabel(label)
     for panel, (name, label) in zip(axes[2:], OVER_SPEED.items(), strict=True):
         _over_speed(panel, result.value.sel(quantity=name), name)
         panel.set(ylabel=label, xlabel="speed [mm/s]")
     axes[2].legend(**LEGEND)
-    fewer = [f"{n} at {speed:g}" for speed, n in walked(result).items() if n < result.sizes["start"]]
-    note = f"; whole strides of {', '.join(fewer)} mm/s" if fewer else ""
-    head(figure, f"The walking insect beside measured ones; bars at {SPEED:g} mm/s", caption(result) + note)
+    title = f"The walking insect beside measured ones, means with 95 % intervals; bars at {SPEED:g} mm/s"
+    head(figure, title, f"{caption(result)}; whole strides: {walked_in_words(result)}")
     return figure
 
 
 def _bars(axes: "Axes", values: "xr.DataArray", names: tuple[str, ...]) -> None:
-    """Draw means and standard deviations over the starts, (quantity, start), a group for each pair of legs."""
+    """Draw means over the starts, (quantity, start), a group for each pair of legs."""
     for n, name in enumerate(names):
-        legs = values.sel(quantity=[f"{name}, {segment}" for segment in SEGMENTS])
+        middle, ends = _means(values.sel(quantity=[f"{name}, {segment}" for segment in SEGMENTS]), name)
         label = name.removesuffix(" impulse").removesuffix(" torque")
-        style = {"color": SERIES[n]["color"], "capsize": 2, "label": label, "yerr": legs.std("start", ddof=1)}
-        axes.bar(np.arange(len(SEGMENTS)) + (n - 1) * 0.27, legs.mean("start"), 0.25, **style)
+        style = {"color": SERIES[n]["color"], "capsize": 2, "label": label, "yerr": ends, "zorder": 2}
+        axes.bar(np.arange(len(SEGMENTS)) + (n - 1) * 0.27, middle, 0.25, **style)
     axes.set_xticks(range(len(SEGMENTS)), [f"{segment} legs" for segment in SEGMENTS])
     axes.axhline(0.0, color="0.4", linewidth=0.8)
-    axes.set_xlim(-0.55, len(SEGMENTS) - 0.45)
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, low + 1.35 * (high - low))  # room for the legend
+    axes.margins(y=0.2)  # room for the legend
     axes.legend(**LEGEND, loc="upper left")
     tidy(axes)
-    axes.set_axisbelow(True)
 
 
 def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
@@ -319,13 +313,13 @@ def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
         if row.quantity == name:
             ends = (row.speed - 0.4, row.speed + 0.4) if row.depends else (20.0, 40.0)
             axes.fill_between(ends, row.low, row.high, color=INSECTS, alpha=0.5, linewidth=0)
-    mean, deviation = values.mean("start"), values.std("start", ddof=1)
-    if name in PHASES:
-        beside = values.copy(data=np.apply_along_axis(unrolled, values.get_axis_num("start"), values.values))
-        mean, deviation = beside.mean("start") % 1.0, beside.std("start", ddof=1)
-    axes.errorbar(values.speed, mean, deviation, label="ours", color=OURS, **CURVE)
+    axes.errorbar(values.speed, *_means(values.transpose("speed", "start"), name), label="ours", **OURS)
     axes.fill_between([], [], color=INSECTS, alpha=0.5, linewidth=0, label="insects")
     axes.set_xlim(20.0, 40.0)
-    if name.startswith("ripple"):
-        axes.set_ylim(min(0.0, axes.get_ylim()[0]), 1.0)
     tidy(axes)
+
+
+def _means(values: "xr.DataArray", quantity: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the means of rows, (row, start), and how far their intervals reach below and above, (2, row)."""
+    middle, low, high = np.transpose([_mean(row, quantity) for row in np.asarray(values)])
+    return middle, np.stack([middle - low, high - middle])

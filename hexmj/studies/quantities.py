@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.controllers.planning import begin
-from hexmj.controllers.protocol import Controller
 from hexmj.legs import SIDE
 from hexmj.measures.study import WalkSettings
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.rotations import heading, rotated, turned
-from hexmj.threads import check_memory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,9 +71,6 @@ FRAME = 0.04
 PLATE = 0.01
 """Time over which forces are averaged, as by a force plate [s]."""
 
-KEPT = 1100
-"""Memory of a physics step of a start [bytes]."""
-
 HOP = 0.12
 """A foot swings if it is off the ground for more than this part of the time from PEP_0 to AEP_0."""
 
@@ -126,25 +121,21 @@ class Strides:
 
 
 def last_strides(
-    settled: "Settled",
-    controller: Controller,
-    velocity: float,
-    duration: float,
-    measured: float,
-    threads: int | None = None,
+    settled: "Settled", walks: WalkSettings, measured: float, threads: int | None = None
 ) -> Iterator[tuple[int, Strides]]:
     """Yield each start that does not fall with its whole strides in the last part of the walk.
 
     Args:
         settled: starts at rest, with sensors of the feet's forces.
-        controller, velocity, duration, threads: as of a `WalkSettings`.
+        walks: controller, velocity and duration.
         measured: last part of the duration [time units].
+        threads: by default one per core.
     """
     from hexmj.physics.rollout import drive
 
-    plan = begin(controller, settled.starts, velocity, settled.stride, None, threads)
-    first = (duration - measured) / settled.stride.dt * settled.substeps
-    chunks = [chunk for chunk in drive(settled, plan, duration, threads=threads) if chunk.first >= first]
+    plan = begin(walks.controller, settled.starts, walks.velocity, settled.stride, None, threads)
+    first = (walks.duration - measured) / settled.stride.dt * settled.substeps
+    chunks = [chunk for chunk in drive(settled, plan, walks.duration, threads=threads) if chunk.first >= first]
     for start in chunks[-1].ids[~chunks[-1].fell] if chunks else ():
         standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
         begun = onsets(standing, rows_of_a_hop(settled))
@@ -206,11 +197,9 @@ def quantity_table(walks: WalkSettings, measured: float, threads: int | None = N
 
     from hexmj.physics.settle import Settling
 
-    steps = measured / walks.stride.dt * walks.conditions.substeps(walks.stride)
-    check_memory(f"the last strides of {walks.n_starts} starts", KEPT * steps * walks.n_starts)
     settled = Settling(walks.conditions, walks.stride, threads, pushes=True).at(walks.starts)
     values = np.full((len(UNITS), walks.n_starts), np.nan)
-    for start, strides in last_strides(settled, walks.controller, walks.velocity, walks.duration, measured, threads):
+    for start, strides in last_strides(settled, walks, measured, threads):
         values[:, start] = list(quantities(strides, settled.compiled).values())
     return xr.Dataset({"value": (("quantity", "start"), values, {"units": "of the quantity"})}, {"quantity": [*UNITS]})
 
@@ -294,8 +283,10 @@ def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
 def _posture(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     """Return heights of the coxae over the ground, and the pitch of the line from hind to front coxae."""
     from hexmj.bodies.ground import ground_level
+    from hexmj.bodies.kinematics import joint_numbers, posed
 
-    coxae = _coxae(compiled)
+    first = joint_numbers(compiled.model, compiled.body)[:, 0]
+    coxae = posed(compiled.model, compiled.home).xpos[compiled.model.jnt_bodyid[first]]  # (leg, 3) in the root frame
     places = strides.qpos[:, None, :3] + rotated(strides.qpos[:, None, 3:7], coxae)
     below = [ground_level(compiled.conditions, places[:, leg, :2]) for leg in range(6)]
     height = places[..., 2] - compiled.foot_radius
@@ -330,11 +321,3 @@ def _work(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
 def _ahead(strides: Strides) -> np.ndarray:
     """Return the speed of the root along its heading, (row,) [mm/s]."""
     return turned(strides.velocity[:, None, :2], -heading(strides.qpos[:, 3:7]))[:, 0, 0]
-
-
-def _coxae(compiled: "CompiledBody") -> np.ndarray:
-    """Return the positions of the legs' first joints in the root frame, (leg, 3) [mm]."""
-    from hexmj.bodies.kinematics import joint_numbers, posed
-
-    first = joint_numbers(compiled.model, compiled.body)[:, 0]
-    return posed(compiled.model, compiled.home).xpos[compiled.model.jnt_bodyid[first]]

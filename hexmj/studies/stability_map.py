@@ -70,9 +70,6 @@ LOOKS: dict[str, tuple[str, str | None]] = {
 """Mechanism -> colour and hatch: grey for no event, green for saved starts, warm for falls after a planned loss, violet
 for other falls; falls are hatched, for readers without colours."""
 
-MARKS = {"physical": ("0.1", 22), "toppled": ("white", 14)}
-"""Measure -> colour and size of the mark above which its starts lie."""
-
 
 @dataclass(frozen=True)
 class StabilityMap(Study):
@@ -222,32 +219,27 @@ def map_figure(result: "xr.Dataset") -> "Figure":
     result = result.transpose("value", "velocity", "start", ...)
     rows, columns = result.sizes["value"], result.sizes["velocity"]
     figure = picture(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.62 * (rows + 1))
-    physical, saved = figure.subplots(1, 2, sharey=True)
+    panels = figure.subplots(1, 2, sharey=True)
+    unknown = np.full((1, columns), np.nan)  # no condition changes kinematic walks
     falls = np.concatenate([result.kinematic.values[:1], result.physical.values])
     words = [[f"{number:.2f}" for number in row] for row in falls]
-    if result.attrs["over"] == "vp":
-        for (row, column), number in np.ndenumerate(result.froude.values):
-            words[1 + row][column] += f"\nFr {number:.2g}"
     lost = np.isfinite(result.static_loss.values).sum(axis=-1)
     counts = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name").values
-    planned = np.isfinite(result.planned_loss.values[0]).sum(axis=-1)
-    of_lost = [[f"{n} lost" for n in planned]]
-    for row in zip(counts, lost, strict=True):
-        of_lost.append([f"{n} of {total}" if total else "none lost" for n, total in zip(*row, strict=True)])
-    rescued = np.concatenate([np.full((1, columns), np.nan), result.saved.values])
-    for axes, numbers, texts, colours, title in (
-        (physical, falls, words, "YlOrRd", "physical FLSS"),
-        (saved, rescued, of_lost, "YlGn", "saved by dynamics, of the static losses"),
-    ):
+    of_lost = [[""] * columns] + [
+        [f"{n} of {total}" if total else "none lost" for n, total in zip(*row, strict=True)]
+        for row in zip(counts, lost, strict=True)
+    ]
+    drawn = {
+        "physical FLSS": (falls, words, "YlOrRd"),
+        "saved by dynamics, of the static losses": (np.concatenate([unknown, result.saved.values]), of_lost, "YlGn"),
+    }
+    for axes, (title, (numbers, texts, colours)) in zip(panels, drawn.items(), strict=True):
         heat_map(axes, numbers, np.array(texts), cmap=colours, vmin=0.0, vmax=1.0, origin="lower")
-        axes.set_xticks(np.arange(columns - 1) + 0.5, minor=True)
-        axes.set_yticks(np.arange(rows) + 0.5, minor=True)
-        axes.grid(which="minor", color="white", linewidth=2.0)
         axes.axhline(0.5, color="white", linewidth=9.0)
         axes.set_title(title, fontsize=11)
         velocity_columns(axes, result.velocity.values)
-    physical.set_yticks(range(rows + 1), ["kinematic", *(f"{value:g}" for value in result.value.values)])
-    physical.set_ylabel(_label(result))
+    panels[0].set_yticks(range(rows + 1), ["kinematic", *(f"{value:g}" for value in result.value.values)])
+    panels[0].set_ylabel(_label(result))
     head(figure, "Falls in physics, and starts that dynamics saves", _caption(result))
     return figure
 
@@ -258,20 +250,17 @@ def mechanisms_figure(result: "xr.Dataset") -> "Figure":
     figure = picture(max(8.0, 2.6 + 2.3 * columns), 4.6)
     panels = figure.subplots(1, columns, sharey=True, squeeze=False)[0]
     for panel, v in zip(panels, result.velocity.values, strict=True):
-        data, bottom = result.sel(velocity=v), np.zeros(len(values))
+        shares, bottom = result["count"].sel(velocity=v) / result.sizes["start"], np.zeros(len(values))
         for name, (colour, hatch) in LOOKS.items():
-            share = data["count"].sel(mechanism_name=name).values / result.sizes["start"]
+            share = shares.sel(mechanism_name=name).values
             style = {"color": colour, "hatch": hatch, "edgecolor": "0.25", "linewidth": 0.0}
             panel.bar(values, share, 0.82, bottom, label=name.replace("_", " "), **style)
             bottom = bottom + share
-        for measure, (colour, size) in MARKS.items():
-            style = {"color": colour, "markersize": size, "markeredgewidth": 1.8, "linestyle": "none"}
-            panel.plot(values, 1.0 - data[measure].values, marker="_", **style)
         panel.set_title(f"V = {v:g}", fontsize=11)
         panel.set_xticks(values, [f"{value:g}" for value in result.value.values])
         panel.set(ylim=(0.0, 1.0), xlabel=_label(result).replace(" [", "\n["))
         panel.spines[["top", "right"]].set_visible(False)
-    panels[0].set_ylabel("starts\n(above the marks: fell black, toppled white)")
+    panels[0].set_ylabel("starts (hatched: fell)")
     handles, _ = panels[0].get_legend_handles_labels()
     figure.legend(handles=handles[::-1], **LEGEND, loc="outside right center")
     head(figure, "What happened to every start", _caption(result))
@@ -279,9 +268,7 @@ def mechanisms_figure(result: "xr.Dataset") -> "Figure":
 
 
 def _caption(result: "xr.Dataset") -> str:
-    count = result.sizes["start"]
-    fewer = bool(count < result.attrs["starts"])
-    return caption(result) + f"; {count} of them stand and reach nine of ten tips at every value" * fewer
+    return f"{caption(result)}; {result.sizes['start']} of them stand and reach nine of ten tips at every value"
 
 
 def _label(result: "xr.Dataset") -> str:

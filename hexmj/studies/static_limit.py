@@ -25,7 +25,6 @@ from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from hexmj.measures.physical import PhysicalWalk
@@ -51,11 +50,8 @@ REPORTED = {"slip": "mm/s", "tracking": "mm"}
 FINE = Conditions(longest_substep=0.5)
 """Light legs need physics steps of 0.5 ms or less."""
 
-LINES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)))
+LINES = ("-", "--", ":", "-.")
 """Lines for the masses of the legs in turn."""
-
-BESIDE = 1.03
-"""Factor of V_p by which the points of several masses stand beside each other."""
 
 STYLES: dict[str, dict[str, Any]] = {
     "measured": {"color": "#e08e1b", "marker": "s"},
@@ -202,25 +198,23 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
     figure = picture(9.6, 7.6)
     panels, masses, vps = figure.subplots(2, 2, sharex=True).ravel(), result.leg_mass.values, result.vp.values
     lines: dict[float, Any] = dict(zip(masses, LINES * len(masses), strict=False))
-    shifts = np.geomspace(1.0 / BESIDE, BESIDE, len(masses)) if len(masses) > 1 else [1.0]
-    _kinematic_band(panels[0], result.isel(leg_mass=0, vp=0))
+    alone = result.isel(leg_mass=0, vp=0)  # kinematic FLSS depends on neither
+    style = {"color": MEASURE_STYLES["kinematic"]["color"]}
+    panels[0].axhspan(alone.kinematic_low.item(), alone.kinematic_high.item(), alpha=0.15, linewidth=0, **style)
+    panels[0].axhline(alone.kinematic.item(), linewidth=1.6, label="kinematic", **style)
     for axes, (title, curves) in zip(panels, PANELS.items(), strict=True):
-        for (mass, line), shift in zip(lines.items(), shifts, strict=True):
+        for mass, line in lines.items():
             data = result.sel(leg_mass=mass).sortby("vp")
             for name, label in curves.items():
                 style = STYLES[label] | {"linestyle": line, "label": label if mass == masses[0] and label else None}
                 if title == "FLSS":
-                    frequency_curve(axes, data.vp * shift, data, name, **style)
+                    frequency_curve(axes, data.vp, data, name, **style)
                 else:
                     values = data[name] if "start" not in data[name].dims else data[name].mean("start")
                     axes.plot(data.vp, values, markersize=4.5, linewidth=1.6, **style)
-        axes.set(ylabel=title, xscale="log")
-        axes.update_datalim([(1.0, 0.0)], updatex=False)
-        axes.autoscale_view(scalex=False)
-        axes.set_ylim((0.0, None) if "[mm]" in title else (-0.02, 1.02))
+        axes.set(ylabel=title, xscale="log", ylim=(0.0, None) if "[mm]" in title else (-0.02, 1.02))
         axes.set_xticks(vps, [f"{vp:g}" for vp in vps])
         axes.minorticks_off()
-        axes.set_xlim(0.85 * vps.min(), vps.max() / 0.85)
         tidy(axes)
     for axes in panels[:3]:
         axes.legend(**ABOVE)
@@ -230,10 +224,3 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
     panels[3].legend(handles=handles, **ABOVE)
     head(figure, f"As $V_p$ goes to zero, V = {result.attrs['velocity']:g}, with 95 % intervals", caption(result))
     return figure
-
-
-def _kinematic_band(axes: "Axes", data: "xr.Dataset") -> None:
-    """Draw the kinematic FLSS and its interval, which depend on neither mass nor V_p."""
-    style = {"color": MEASURE_STYLES["kinematic"]["color"]}
-    axes.axhspan(data.kinematic_low.item(), data.kinematic_high.item(), alpha=0.15, linewidth=0, **style)
-    axes.axhline(data.kinematic.item(), linewidth=1.6, label="kinematic", **style)

@@ -16,9 +16,8 @@ from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError
 from hexmj.measures.figures import caption
 from hexmj.measures.study import Study, outcome_table
-from hexmj.measures.tables import VELOCITY, reach
+from hexmj.measures.tables import VELOCITY, frequency, reach
 from hexmj.plotting import LEGEND, SERIES, frequency_curve, head, picture, tidy
-from hexmj.stats import wilson_intervals
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import steps_within
 from hexmj.validate import distinct
@@ -117,42 +116,37 @@ class Terrain(Study):
             beyond the obstacle. Over start too: `OUTCOMES`, the `distance` walked [mm], and `after`, whether the start
             fell after it had reached the obstacle.
         """
-        table = self._over_obstacles(data)
+        before = self.obstacles.values()
+        sizes = {"obstacle": len(before), "grasp": len(self.grasps), "velocity": len(self.velocities)}
+        end = [_end(conditions) for conditions in before]
+        grasp = {"units": "1", "long_name": "adhesion of a foot over the insect's weight"}
+        table = over_axes(sizes, [cell[list(OUTCOMES)] for cell in data]).assign_coords(
+            obstacle=list(self.obstacles),
+            ground=("obstacle", [conditions.ground for conditions in before]),
+            size=("obstacle", [_size(conditions) for conditions in before], {"units": "mm"}),
+            end=("obstacle", end, {"units": "mm", "long_name": "where the obstacle ends or has been climbed"}),
+            grasp=("grasp", list(self.grasps), grasp),
+            velocity=("velocity", self.observed[0], VELOCITY),
+        )
+        for name, text in OUTCOMES.items():
+            table[name].attrs["long_name"] = text
         time = steps_within(self.distance / table.velocity.values, self.stride) * self.stride.dt
         commanded = np.minimum(table.fall, table.velocity.copy(data=time)) * table.velocity
         walked = (table.speed * commanded).assign_attrs(units="mm", long_name="distance walked by O")
         ahead, behind = reach(self.stride)
         upright, reaching = np.isinf(table.fall), commanded > self.conditions.ground_at - ahead
-        after, unit = reaching & ~upright, {"units": "1"}
-        reached, fell = reaching.sum("start"), after.sum("start")
-        low, high = wilson_intervals(fell.values, reached.values)
+        after = reaching & ~upright
+        reached = reaching.sum("start")
         crossed = (upright & (walked > table.end + behind)).sum("start")
         table = table.assign(
             distance=walked,
-            after=after.assign_attrs(unit, long_name="fell after it had reached the obstacle"),
-            reached=reached.assign_attrs(unit, long_name="starts that reached the obstacle"),
-            crossed=crossed.assign_attrs(unit, long_name="starts that crossed it without a fall"),
-            flss=(fell / reached.where(reached > 0)).assign_attrs(unit, long_name="FLSS from there on"),
-            flss_low=(fell.dims, low, unit),
-            flss_high=(fell.dims, high, unit),
+            after=after.assign_attrs(units="1", long_name="fell after it had reached the obstacle"),
+            reached=reached.assign_attrs(units="1", long_name="starts that reached the obstacle"),
+            crossed=crossed.assign_attrs(units="1", long_name="starts that crossed it without a fall"),
+            **frequency("flss", after.where(reaching).transpose(*sizes, "start").values, tuple(sizes)),
         )
+        table.flss.attrs["long_name"] = "FLSS from there on"
         return self.labelled(table, "terrain", observation_time=f"{self.distance:g} / V", distance=self.distance)
-
-    def _over_obstacles(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return the outcomes over (obstacle, grasp, velocity, start)."""
-        before = self.obstacles
-        sizes = {"obstacle": len(before), "grasp": len(self.grasps), "velocity": len(self.velocities)}
-        end = [_end(conditions) for conditions in before.values()]
-        grasp = {"units": "1", "long_name": "adhesion of a foot over the insect's weight"}
-        table = over_axes(sizes, [cell[list(OUTCOMES)] for cell in data]).assign_coords(
-            obstacle=list(before),
-            ground=("obstacle", [conditions.ground for conditions in before.values()]),
-            size=("obstacle", [_size(conditions) for conditions in before.values()], {"units": "mm"}),
-            end=("obstacle", end, {"units": "mm", "long_name": "where the obstacle ends or has been climbed"}),
-            grasp=("grasp", list(self.grasps), grasp),
-            velocity=("velocity", self.observed[0], VELOCITY),
-        )
-        return table.assign({name: table[name].assign_attrs(long_name=text) for name, text in OUTCOMES.items()})
 
 
 def _end(conditions: Conditions) -> float:
@@ -183,7 +177,7 @@ def terrain_figure(result: "xr.Dataset") -> "Figure":
         axes.label_outer()
         tidy(axes)
     handles, _ = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=min(5, len(handles)))
+    figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=len(handles))
     title = "Falls once the obstacle has been reached, with 95 % intervals"
     head(figure, title, caption(result, int(result.reached.min())))
     return figure
