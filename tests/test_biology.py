@@ -15,7 +15,7 @@ from hexmj import LDVS, UNCOORDINATED, Conditions, InputError, draw_starts
 from hexmj.body import STICK_INSECT
 from hexmj.controllers.planning import begin
 from hexmj.legs import MIRROR
-from hexmj.measures.study import WalkSettings
+from hexmj.measures.tables import WalkSettings
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, Settling
 from hexmj.studies.biology import ANIMALS, PAST, SOURCES, SPEEDS, STEP, Animal, Biology, biology_figure, timing

@@ -10,7 +10,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import KinematicFlss, first_loss, flss, flss_over_range, losses_of_range
-from hexmj.measures.study import WalkSettings
+from hexmj.measures.tables import WalkSettings
 from hexmj.starts import SLAB, draw_slabs, draw_start, draw_starts
 from hexmj.stats import wilson_interval
 from hexmj.sweep import run_cells, run_study

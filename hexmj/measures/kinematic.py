@@ -15,8 +15,7 @@ from hexmj.controllers.planning import advanced, begin, check_velocities, first_
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.io import attributes
-from hexmj.measures.study import WalkSettings
-from hexmj.measures.tables import frequency_table, losses_by_sample, observed, settings
+from hexmj.measures.tables import WalkSettings, frequency_table, losses_by_sample, observed, settings
 from hexmj.progress import Progress
 from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs
 from hexmj.stats import wilson_interval

@@ -12,7 +12,7 @@ from hexmj.controllers.planning import check_velocities
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
 from hexmj.io import attributes
-from hexmj.measures.tables import observed, over_start, settings
+from hexmj.measures.tables import WalkSettings, observed, over_start, settings
 from hexmj.progress import Progress
 from hexmj.starts import check_draw, draw_starts
 from hexmj.timing import Acceleration, Stride
@@ -33,34 +33,6 @@ UNITS = {
     **{"tilt": "rad", "slip": "mm/s"},
 }
 """Units of `Outcomes`; the others are numbers."""
-
-
-@dataclass(frozen=True)
-class WalkSettings:
-    """Settings of the walks of a cell."""
-
-    controller: Controller
-    velocity: float
-    """V_r, or its final value when accelerating."""
-    duration: float
-    """Observation time [time units]."""
-    n_starts: int
-    seed: int
-    conditions: Conditions
-    stride: Stride
-    acceleration: Acceleration | None = None
-
-    @property
-    def starts(self) -> np.ndarray:
-        """Tips at time 0, (start, leg) [mm]."""
-        return draw_starts(self.n_starts, self.seed, self.stride)
-
-    def walk(self, starts: np.ndarray, threads: int | None) -> "PhysicalWalk":
-        """Return physical walks, kept whole, from some starts, (start, leg) [mm]."""
-        from hexmj.measures.physical import physical_walk
-
-        how: Any = {"conditions": self.conditions, "stride": self.stride, "acceleration": self.acceleration}
-        return physical_walk(starts, self.controller, self.velocity, self.duration, **how, threads=threads)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,6 +160,14 @@ def by_halves(
             raise
         for half in np.array_split(which, 2) if len(which) > 1 else ():
             yield from by_halves(half, walk, diverging)
+
+
+def kept_walk(walks: WalkSettings, starts: np.ndarray, threads: int | None) -> "PhysicalWalk":
+    """Return physical walks, kept whole, from some starts, (start, leg) [mm]."""
+    from hexmj.measures.physical import physical_walk
+
+    how: Any = {"conditions": walks.conditions, "stride": walks.stride, "acceleration": walks.acceleration}
+    return physical_walk(starts, walks.controller, walks.velocity, walks.duration, **how, threads=threads)
 
 
 def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":

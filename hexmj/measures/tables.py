@@ -1,13 +1,14 @@
-"""Tables of results: axes, frequencies with 95 % intervals, and the settings that a result records."""
+"""Settings of walks, and tables of results: axes, frequencies with 95 % intervals, recorded settings."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, settings_of
-from hexmj.starts import SAMPLE, checked_list
+from hexmj.starts import SAMPLE, checked_list, draw_starts
 from hexmj.stats import paired_difference, wilson_intervals
 from hexmj.sweep import over_axes
 from hexmj.timing import Acceleration, Stride, check_in_time, check_reached, observation_duration, steps_within
@@ -25,6 +26,27 @@ VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
 """Attributes of an axis of velocities."""
 
 Dims = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class WalkSettings:
+    """Settings of the walks of a cell."""
+
+    controller: Controller
+    velocity: float
+    """V_r, or its final value when accelerating."""
+    duration: float
+    """Observation time [time units]."""
+    n_starts: int
+    seed: int
+    conditions: Conditions
+    stride: Stride
+    acceleration: Acceleration | None = None
+
+    @property
+    def starts(self) -> np.ndarray:
+        """Tips at time 0, (start, leg) [mm]."""
+        return draw_starts(self.n_starts, self.seed, self.stride)
 
 
 def reach(stride: Stride) -> tuple[float, float]:

@@ -164,7 +164,9 @@ class League(ControllerStudy):
         else:
             late, start = DELAY * conditions.vp, draw_starts(1, 0, self.stride)
             reads = isinstance(begin(controller, start, self.trial_velocity, self.stride), FeedbackPlan)
-            if not (reads or isinstance(controller, SteerableController)) or (trial == "late" and not round(late / self.stride.dt)):
+            if not (reads or isinstance(controller, SteerableController)) or (
+                trial == "late" and not round(late / self.stride.dt)
+            ):
                 return None
             controller = controller if reads else SensoryFeedback(controller)
             senses = {"noise": {"noise": NOISE}, "late": {"delay": late}}

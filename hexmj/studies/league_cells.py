@@ -14,8 +14,8 @@ from hexmj.errors import InputError
 from hexmj.gaits import CYCLES, steady_state_gait
 from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
-from hexmj.measures.study import UNITS, Study, WalkSettings, by_halves, standing_starts
-from hexmj.measures.tables import FRESH, PERIODS, happened, over_start
+from hexmj.measures.study import UNITS, Study, by_halves, standing_starts
+from hexmj.measures.tables import FRESH, PERIODS, WalkSettings, happened, over_start
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import Case, StableWalks, TooFewStable

@@ -9,7 +9,7 @@ import numpy as np
 
 from hexmj.controllers.planning import begin
 from hexmj.legs import SIDE
-from hexmj.measures.study import WalkSettings
+from hexmj.measures.tables import WalkSettings
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
 from hexmj.rotations import heading, rotated, turned
 

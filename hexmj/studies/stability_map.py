@@ -12,8 +12,8 @@ from hexmj.controllers.protocol import Controller, FeedbackPlan
 from hexmj.errors import InputError
 from hexmj.measures.compare import BESIDE, MEASURES
 from hexmj.measures.figures import caption
-from hexmj.measures.study import UNITS, Study, WalkSettings, by_halves, standing_starts
-from hexmj.measures.tables import differences, frequency, happened, over_start, velocity_axis
+from hexmj.measures.study import UNITS, Study, by_halves, kept_walk, standing_starts
+from hexmj.measures.tables import WalkSettings, differences, frequency, happened, over_start, velocity_axis
 from hexmj.plotting import LEGEND, head, heat_map, picture, velocity_columns
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
@@ -186,7 +186,7 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
 
 
 def _fates(walks: WalkSettings, which: np.ndarray, threads: int | None) -> dict[str, np.ndarray]:
-    walk = walks.walk(walks.starts[which], threads)
+    walk = kept_walk(walks, walks.starts[which], threads)
     static = {"static_loss": loss_time(static_plan(walk), threads=threads)}
     return vars(walk.outcomes) | static | {"mechanism": mechanisms(walk), "direction": fall_direction(walk)}
 

@@ -15,8 +15,8 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.measures.compare import with_flss
 from hexmj.measures.figures import caption
-from hexmj.measures.study import Study, WalkSettings
-from hexmj.measures.tables import over_start
+from hexmj.measures.study import Study, kept_walk
+from hexmj.measures.tables import WalkSettings, over_start
 from hexmj.plotting import LEGEND, MEASURE_STYLES, frequency_curve, head, picture, tidy
 from hexmj.stability import loss_time, walk_margin
 from hexmj.sweep import Cell, over_axes
@@ -152,7 +152,7 @@ def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Datas
     """Return the outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start: a cell of the study."""
     from hexmj.measures.support import grounded
 
-    walk = walks.walk(walks.starts, threads)
+    walk = kept_walk(walks, walks.starts, threads)
     outcomes = vars(walk.outcomes) | {"grounded_loss": loss_time(grounded(walk), threads=threads)}
     units = dict.fromkeys(LOSSES.values(), "time unit") | REPORTED
     table = over_start({name: outcomes[name] for name in units}, units)
