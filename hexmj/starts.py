@@ -31,9 +31,7 @@ def draw_starts(n_starts: int, seed: int, stride: Stride | None = None) -> np.nd
     Raises:
         InputError: a number of starts or a seed that makes no sense.
     """
-    n_starts, seed = check_draw(n_starts, seed)
-    if n_starts > MOST_DRAWN:
-        raise InputError(f"n_starts = {n_starts}; expected at most {MOST_DRAWN} in one array")
+    n_starts, seed = whole("n_starts", n_starts, 1, MOST_DRAWN), whole("seed", seed, 0)
     return np.concatenate(list(draw_slabs(n_starts, seed, stride or Stride())))
 
 

@@ -10,7 +10,6 @@ import pytest
 
 import hexmj
 from hexmj.gaits import gait, steady_state_gait
-from hexmj.phases import circular_mean, circular_range, wilson_phase
 from hexmj.walks import part_of
 
 STARTS = np.zeros((2, 6))
@@ -67,9 +66,6 @@ CASES: dict[str, tuple[str, Callable[[], Any]]] = {
     "gait at V = 0": ("velocity", lambda: steady_state_gait(hexmj.LDVS, 0.0)),
     "gait of few periods": ("periods", lambda: steady_state_gait(hexmj.LDVS, 0.4, periods=3)),
     "gait of one step": ("1 steps", lambda: gait(hexmj.walk(STARTS, hexmj.LDVS, 0.4, 0.1))),
-    "no phases": ("phase", lambda: circular_mean([])),
-    "phases in no rows": ("phase", lambda: circular_range([0.95, 0.05])),
-    "gait of a negative velocity": ("velocity", lambda: wilson_phase([0.5, -1.0])),
     "five legs of a walk": ("stance", lambda: replace(WALK, stance=np.ones((2, 1, 5), dtype=bool))),
     "times of another walk": ("time", lambda: replace(WALK, time=np.ones(3))),
     "walk of no steps": ("0 steps", lambda: hexmj.loss_time(part_of(WALK, slice(0)))),

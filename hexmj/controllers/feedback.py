@@ -21,7 +21,7 @@ from hexmj.controllers.planning import first_losses
 from hexmj.controllers.protocol import FeedbackPlan, Sensed, SteerablePlan
 from hexmj.controllers.wrappers import WrappedPlan, Wrapper
 from hexmj.errors import InputError
-from hexmj.walks import PlannedWalk, copied, joined
+from hexmj.walks import PlannedWalk, joined
 
 SAME = 1e-9
 """Greatest distance of a tip from one step beyond its sensed place at which it counts as moved on from there [mm]."""
@@ -90,4 +90,4 @@ class SensedPlan(WrappedPlan):
         self._stance = step.stance[0].copy()
         put_back = self._targets < self._ordered  # such a tip is not on its way to the AEP
         aep, self._ordered = np.where(put_back, np.nan, step.aep[0]), self._targets
-        return copied(replace(step, x=self._targets[None], aep=aep[None]))
+        return replace(step, x=self._targets[None], aep=aep[None])

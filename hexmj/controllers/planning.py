@@ -82,10 +82,8 @@ def check_plan(plan: Plan, starts: np.ndarray, stride: Stride) -> None:
     """Raise InputError unless a plan is at time 0 of these starts, (start, leg) [mm], with this stride."""
     if not isinstance(plan, Plan):
         raise InputError(f"begin returned {short(plan)}; expected a plan with starts, stride, done and advance")
-    if plan.done != 0:
-        raise InputError(f"the plan is at step {plan.done}; expected a plan at time 0")
-    if plan.stride != stride:
-        raise InputError(f"the plan's stride is {plan.stride}; expected {stride}")
+    if plan.done != 0 or plan.stride != stride:
+        raise InputError(f"the plan is at step {plan.done} with {plan.stride}; expected step 0 with {stride}")
     if not np.array_equal(plan.starts, starts):
         raise InputError(f"the plan's starts, {np.shape(plan.starts)}, are not those of the walk, {starts.shape}")
 

@@ -130,8 +130,7 @@ class Cruse1998:
         if isinstance(old, Symmetric):
             changed = replace(old, **{key: value for key in asdict(old) if key.partition("_")[0] in kinds})
         else:
-            weights = {(kind, pair): getattr(old, kind)[pair] for kind, pair in PLACES.values()}
-            changed = Weights.of({place: value if place[0] in kinds else weight for place, weight in weights.items()})
+            changed = Weights.of({(k, at): value if k in kinds else getattr(old, k)[at] for k, at in PLACES.values()})
         if np.array_equal(general(changed).to_vector(), general(old).to_vector()):
             raise InputError(f"{name} equals {self.name}; expected a mechanism that changes the weights")
         return replace(self, weights=changed, name=name)

@@ -1,15 +1,14 @@
 """Networks by name: the paper's weight sets and our own, and parameter files (TOML)."""
 
-from collections.abc import Iterable
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from hexmj.controllers.cruse1998.network import Cruse1998, named_variant, variant_name
-from hexmj.controllers.cruse1998.weights import NEIGHBOURS, PLACES, AnyWeights, Symmetric, Weights
+from hexmj.controllers.cruse1998.weights import NEIGHBOURS, PLACES, Symmetric, Weights
 from hexmj.errors import InputError
 from hexmj.files import SEARCHED, read_toml
-from hexmj.validate import choice, number
+from hexmj.validate import choice
 
 OWN = Path(__file__).with_name("own.toml")
 """Our own weight sets, with the commands that found or built them."""
@@ -31,12 +30,21 @@ def read_network(table: dict[str, Any], where: str, name: str) -> Cruse1998:
     Raises:
         InputError: a key or value is invalid.
     """
-    rules = {key: table[key] for key in ("order", "model_variant") if key in table}
+    order, model_variant = (table.get(key, "printed") for key in ("order", "model_variant"))
+    others = ("order", "model_variant", "command", SEARCHED)
     try:
-        weights = _weights({key: value for key, value in table.items() if key not in (*rules, "command", SEARCHED)})
-        model_variant = named_variant(rules.get("model_variant", "printed"))
-        return Cruse1998(weights, rules.get("order", "printed"), name, model_variant)
-    except InputError as error:
+        match {key: value for key, value in table.items() if key not in others}:
+            case {"symmetric": dict() as values, **more} if not more:
+                weights = Symmetric(**values)
+            case {"weights": dict() as kinds, **more} if not more and all(
+                isinstance(one, dict) for one in kinds.values()
+            ):
+                values = {f"{kind} {key}": value for kind, entries in kinds.items() for key, value in entries.items()}
+                weights = Weights.of({PLACES[choice("weight", name, PLACES)]: one for name, one in values.items()})
+            case tables:
+                raise InputError(f"tables {', '.join(tables)}; expected [symmetric], or [weights.p1] to [weights.p4]")
+        return Cruse1998(weights, order, name, named_variant(model_variant))
+    except (InputError, TypeError) as error:
         raise InputError(f"{where}: {error}") from None
 
 
@@ -59,24 +67,6 @@ def network_toml(network: Cruse1998) -> str:
             if value := getattr(weights, kind)[pair].item():
                 tables["weights"][kind][name.removeprefix(f"{kind} ")] = value
     return tomli_w.dumps({key: value for key, value in rules.items() if value != "printed"} | tables)
-
-
-def _weights(table: dict[str, Any]) -> AnyWeights:
-    match table:
-        case {"symmetric": dict() as values} if len(table) == 1:
-            return Symmetric(**_numbers(values, [field.name for field in fields(Symmetric)]))
-        case {"weights": dict() as kinds} if len(table) == 1 and all(isinstance(one, dict) for one in kinds.values()):
-            values = {f"{kind} {key}": value for kind, entries in kinds.items() for key, value in entries.items()}
-            return Weights.of({PLACES[name]: value for name, value in _numbers(values, PLACES).items()})
-    raise InputError(
-        f"tables {', '.join(table) or 'none'}; expected [symmetric], or [weights.*] with {', '.join(NEIGHBOURS)}, and"
-        " before them order and model_variant"
-    )
-
-
-def _numbers(table: dict[str, Any], valid: Iterable[str]) -> dict[str, float]:
-    """Return the entries of a table if all are numbers with valid names."""
-    return {choice("weight", name, valid): number(name, value) for name, value in table.items()}
 
 
 HWS = Cruse1998(

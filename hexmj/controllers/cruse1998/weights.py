@@ -13,7 +13,7 @@ import numpy as np
 
 from hexmj.errors import InputError
 from hexmj.legs import LEGS, N1, N2, N3, N4
-from hexmj.validate import numbers
+from hexmj.validate import number, numbers
 
 NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
 """Kind of weight -> for each destination leg the legs that act on it."""
@@ -71,7 +71,7 @@ class Weights:
         """Return weights from numbers by kind and (destination, source) leg, each from 0 to 5; the others are 0."""
         matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
         for (kind, pair), value in numbers.items():
-            matrices[kind][pair] = value
+            matrices[kind][pair] = number(f"{kind} {pair}", value)
         return cls(**matrices)
 
     @classmethod
@@ -118,8 +118,8 @@ class Symmetric:
 
     def __post_init__(self) -> None:
         for key, value in asdict(self).items():
-            if not math.isfinite(value) or (key in ("p2", "p4_i") and value not in (0, 1)):
-                allowed = "0 or 1, since it is binary in the paper" if key in ("p2", "p4_i") else "a finite number"
+            if not math.isfinite(number(key, value)) or (key.startswith(BINARY) and value not in (0, 1)):
+                allowed = "0 or 1, as in the paper" if key.startswith(BINARY) else "a finite number"
                 raise InputError(f"{key} = {value}; expected {allowed}")
             object.__setattr__(self, key, float(value))
 
