@@ -55,7 +55,6 @@ def test_a_stepwise_plan_passes_on_what_is_sensed():
     [
         ("x", Step(np.zeros((2, 6)), True)),
         ("stance", Step(0.0, 1.0)),
-        ("x", Step(True, True)),
         ("height", Step(0.0, True, height=cast(Any, "high"))),
         ("Step", (0.0, True)),
     ],

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -68,8 +67,11 @@ class StepwisePlan:
                 raise InputError(f"the function of a step returned {short(step)}; expected a Step")
             for name, values in planned.items():
                 value = getattr(step, name)
-                if value is not None or name not in defaults:
-                    _put(name, value, values[n])
+                try:
+                    if value is not None or name not in defaults:
+                        np.copyto(values[n], leg_last(value), casting="same_kind")
+                except (TypeError, ValueError) as error:
+                    raise InputError(f"{name} of a step does not broadcast to {shape[1:]}: {error}") from None
         self.done, self.age = self.done + steps, self.age + steps
         time = np.arange(self.done - steps + 1, self.done + 1) * stride.dt
         return PlannedWalk(time, v, **planned, geometry=stride.geometry)
@@ -101,18 +103,3 @@ def stepwise(
     if sense:
         plan.sense = sense
     return plan
-
-
-def _put(name: str, value: Any, into: np.ndarray) -> None:
-    """Write a value of one step into an array, (start, leg)."""
-    given = np.asarray(leg_last(value))
-    try:
-        if given.dtype.kind in ("b" if name == "stance" else "fiu"):
-            into[:] = given
-            return
-    except ValueError:
-        pass
-    raise InputError(
-        f"{name} of a step has the shape {given.shape} and the type {given.dtype}; expected"
-        f" {'booleans' if name == 'stance' else 'numbers'} that broadcast to {into.shape}"
-    )
