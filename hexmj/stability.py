@@ -94,13 +94,13 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
     if stands.ndim != 1:
         raise InputError(f"stance has the shape {stands.shape}; expected (leg,)")
     points = tips[stands]
-    if len(points) < 3 or np.linalg.matrix_rank(spread := points - points[0]) < 2:
+    if len(points) < 3:
         return points
     from scipy.spatial import ConvexHull, QhullError
 
     try:
-        return points[ConvexHull(spread / np.abs(spread).max()).vertices]
-    except QhullError:  # within its rounding all lie on one line
+        return points[ConvexHull(points - points[0]).vertices]
+    except QhullError:  # all lie on one line
         return points
 
 

@@ -44,10 +44,8 @@ class SensoryFeedback(Wrapper):
     def wrap(self, plan: Any) -> "SensedPlan":
         """See `Wrapper`; the plan has no feedback of its own, and can be steered."""
         if isinstance(plan, FeedbackPlan) or not isinstance(plan, SteerablePlan):
-            raise InputError(
-                f"feedback around {self.controller.name}; expected a controller without feedback of its own whose plans"
-                " can be steered (tips, standing, see, restart, slow_down)"
-            )
+            expected = "a steerable plan (tips, standing, see, restart, slow_down) without feedback of its own"
+            raise InputError(f"feedback around {self.controller.name}; expected {expected}")
         return SensedPlan(plan)
 
 

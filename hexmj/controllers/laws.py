@@ -32,6 +32,9 @@ from hexmj.walks import PLANNED, PlannedWalk, joined, of_starts
 N_STARTS, STEPS = 16, 600
 """Starts of a trial and steps of its walk: 60 time units, a swing and a stance at V = 0.5."""
 
+EVERY_OTHER = np.arange(N_STARTS) % 2 == 0
+"""Every other start, (start,) of bool."""
+
 DIVIDED = (1, 7, 250, 342)
 """The same number of steps in parts."""
 
@@ -76,11 +79,6 @@ class Trial:
     def walk(self) -> PlannedWalk:
         """All steps at once."""
         return advanced(self.begin(), STEPS)
-
-    @property
-    def every_other(self) -> np.ndarray:
-        """Every other start, (start,) of bool."""
-        return np.arange(len(self.starts)) % 2 == 0
 
     def of(self, which: Any) -> "Trial":
         """Return the trial of some starts."""
@@ -191,7 +189,7 @@ def _mirrored(trial: Trial) -> None:
 def _see(trial: Trial) -> None:
     """A steerable plan is where its last step says, and continues from other legs after see."""
     for variant, plan in _steerable(trial):
-        last, which = advanced(plan, BEFORE), trial.every_other
+        last, which = advanced(plan, BEFORE), EVERY_OTHER
         _check_legs("after a step", plan, last.x[-1], last.stance[-1])
         tips, standing = last.x[-1, ::-1].copy(), last.stance[-1, ::-1].copy()
         plan.see(tips.copy(), standing.copy())
@@ -206,7 +204,7 @@ def _see(trial: Trial) -> None:
 def _restart(trial: Trial) -> None:
     """Starts that restart walk as they begin, and the others are not affected."""
     for variant, plan in _steerable(trial):
-        last, which = advanced(plan, BEFORE), trial.every_other
+        last, which = advanced(plan, BEFORE), EVERY_OTHER
         others = replace(trial, starts=trial.starts[::-1])
         plan.restart(which.copy(), others.starts.copy())
         tips = np.where(which[:, None], others.starts, last.x[-1])
@@ -220,7 +218,7 @@ def _restart(trial: Trial) -> None:
 def _slow_down(trial: Trial) -> None:
     """Starts that are slowed down begin at V_r(0) again, and the others are not affected."""
     for variant, plan in _steerable(trial):
-        last, which = advanced(plan, BEFORE), trial.every_other
+        last, which = advanced(plan, BEFORE), EVERY_OTHER
         plan.slow_down(which.copy())
         _check_legs("after slow_down", plan, last.x[-1], last.stance[-1])
         on, ages = advanced(plan, AFTER), np.where(which, 0, AT_SPEED if variant.at_speed else BEFORE)
@@ -234,7 +232,7 @@ def _slow_down(trial: Trial) -> None:
 def _sense(trial: Trial) -> None:
     """With sensory feedback a start depends on what is sensed of it, and of no other."""
     if isinstance(trial.begin(), FeedbackPlan):
-        which, last = trial.every_other, [len(trial.starts) - 2]
+        which, last = EVERY_OTHER, [len(trial.starts) - 2]
         felt = np.random.default_rng(0).uniform(-1.0, 1.0, (SENSED_STEPS, len(which), NUMBERS))
         felt[:, ~which] = felt[SENSED_STEPS // 2 :, ::4] = np.nan  # half of the sensed starts have fallen then
         walk, alone = _with_sense(trial, felt), _with_sense(trial.of(last), felt[:, last])

@@ -98,11 +98,8 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
     check_memory(f"{steps} steps of {starts} starts", STEP_MEMORY * steps * starts)
     before = plan.done
     walk = copied(plan.advance(steps))
-    if walk.stance.shape != (steps, starts, len(LEGS)) or plan.done != before + steps:
-        raise InputError(
-            f"advance({steps}) at step {before} returned {walk.stance.shape} and ended at step {plan.done}; expected"
-            f" {(steps, starts, len(LEGS))} and step {before + steps}"
-        )
+    if (shape := walk.stance.shape) != (steps, starts, len(LEGS)) or plan.done != before + steps:
+        raise InputError(f"advance({steps}) at step {before} returned {shape} and ended at step {plan.done}")
     for name in ("time", "velocity", "x", "y", "aep", "height"):
         values = getattr(walk, name)
         bad = np.isinf(values) if name in ("aep", "height") else ~np.isfinite(values)

@@ -162,10 +162,7 @@ class SteerableController(Controller, Protocol):
 def check_steerable(controller: Controller) -> None:
     """Raise InputError unless a controller is a `SteerableController`."""
     if not isinstance(controller, SteerableController):
-        raise InputError(
-            f"{controller.name} cannot be disturbed: it has no begin_at_speed; expected a steerable controller such as"
-            " the 1998 network"
-        )
+        raise InputError(f"{controller.name} cannot be disturbed: it has no begin_at_speed")
 
 
 def check_controller_type(controller: object) -> None:

@@ -25,11 +25,9 @@ from hexmj.walks import PlannedWalk
 Order = Literal["printed", "undelayed", "sequential"]
 """Orders in which the legs are updated, see `Cruse1998.order`; the kernel numbers them in this sequence."""
 
-Rules = tuple[tuple[int, ...], ...]
-"""The order of updates and the choices of a model variant, each as a tuple whose length is the choice's number."""
-
-Constants = tuple[tuple[float, ...], tuple[float, ...], Rules]
-"""Weights, constants and rules, as the kernel reads them."""
+Constants = tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[int, ...], ...]]
+"""Weights, constants and rules, as the kernel reads them: order of updates and choices of a model variant, each as a
+tuple whose length is the choice's number."""
 
 AT_ONCE = 200_000_000
 """Most steps times starts in one call of the kernel: about two seconds, during which Ctrl-C has no effect."""
