@@ -126,9 +126,7 @@ def steps_within(duration: ArrayLike, stride: Stride) -> np.ndarray:
     """
     duration, dt = numbers("duration", duration), stride.dt
     if (odd := duration[~((duration >= dt) & (duration <= MOST_STEPS * dt))]).size:
-        raise InputError(
-            f"duration = {odd[0]:.12g}; expected at least {dt:g} and at most {MOST_STEPS * dt:g} time units"
-        )
+        raise InputError(f"duration = {odd[0]:g}; expected at least {dt:g} and at most {MOST_STEPS * dt:g} time units")
     return np.floor(duration / dt + 1e-6).astype(int)
 
 

@@ -111,11 +111,8 @@ def _object(where: str, what: str, name: str) -> Controller:
 def _module(where: str) -> ModuleType:
     """Import a module, or a file that ends in .py as a module of its own name, also for worker processes."""
     path = Path(where).absolute()
-    if path.suffix == ".py":
-        if not path.is_file():
-            raise InputError(f"{where} does not exist")
-        if str(path.parent) not in sys.path:
-            sys.path.append(str(path.parent))
+    if path.suffix == ".py" and str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
     try:
         module = import_module(path.stem if path.suffix == ".py" else where)
     except (ImportError, SyntaxError, ValueError) as error:
