@@ -20,12 +20,6 @@ def episode(walking: control.Environment, action: np.ndarray) -> list[TimeStep]:
     return steps
 
 
-def run_steps(walking: control.Environment, count: int) -> TimeStep:
-    """Return the last of some steps with zeros."""
-    walking.reset()
-    return [walking.step(ZEROS) for _ in range(count)][-1]
-
-
 def some_actions(steps: int, count: int, seed: int = 0, size: float = 0.3) -> np.ndarray:
     """Return random actions, (step, insect, number)."""
     return np.random.default_rng(seed).uniform(-size, size, (steps, count, 18))

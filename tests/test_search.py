@@ -198,7 +198,6 @@ def test_a_search_keeps_order_and_model_variant_of_its_beginning(tmp_path: Path)
     ("make", "name"),
     [
         (lambda: Problem(HWS, 0.5, 0.1), "velocity"),
-        (lambda: Problem(hexmj.HWS, 0.4, 0.5), "form"),  # pyright: ignore[reportArgumentType]
         (lambda: Problem(HWS, 0.5, 0.5, feedback=True), "feedback"),
         (lambda: Problem(FieldsForm(Pace()), 0.5, 0.5, over="mean"), "over"),
         (lambda: NetworkForm("lvds"), "form"),  # pyright: ignore[reportArgumentType]

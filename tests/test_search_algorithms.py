@@ -53,10 +53,6 @@ def test_selection_is_proportional_to_the_advantage_over_individual_1(costs):
         assert p.tolist() == [1.0] + [0.0] * (len(costs) - 1)
 
 
-def test_selection_probabilities_by_hand():
-    np.testing.assert_allclose(selection_probabilities(np.array([0.5, 0.4, 0.7, 0.2, 0.5])), [0, 0.25, 0, 0.75, 0])
-
-
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 12))
 def test_individual_1_is_the_best_so_far(seed, population):

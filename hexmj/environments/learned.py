@@ -66,9 +66,9 @@ def felt(body: Body, *parts: np.ndarray) -> np.ndarray:
 def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> np.ndarray:
     """Return the sensed numbers, (n, `FELT`), of a vector environment's observations; of a single one (`FELT`,)."""
     orientation, *others = (np.asarray(observations[name]) for name in OBSERVED)
-    if orientation.ndim == 1:
-        return felt_in({name: np.asarray(observations[name])[None] for name in OBSERVED}, body)[0]
-    return felt(body, np.arcsin(np.clip(lean(orientation)[0], -1.0, 1.0)), *others)
+    tilt = np.arcsin(np.clip(lean(orientation.reshape(-1, 4))[0], -1.0, 1.0))
+    sensed = felt(body, tilt, *others)
+    return sensed if orientation.ndim > 1 else sensed[0]
 
 
 @dataclass(frozen=True)

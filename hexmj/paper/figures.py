@@ -149,11 +149,14 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
 
     figure, curves = picture(6.4, 4.6), CURVES[number]
     axes = figure.subplots()
-    data = xr.concat(
-        [_samples(measured[name].lost.sel(observation_time=observation_time)) for name in curves],
-        xr.DataArray(list(curves), dims="curve", name="curve"),
-        combine_attrs="drop_conflicts",
-    )
+    every = [measured[name].lost.sel(observation_time=observation_time) for name in curves]
+    lost: Any = xr.concat(every, xr.DataArray(list(curves), dims="curve", name="curve"), combine_attrs="drop")
+    means = lost.values.reshape(*lost.shape[:2], SAMPLES, -1).mean(axis=3)  # (curve, velocity, sample)
+    means[(lost.values == NO_SET).any(axis=2)] = np.nan
+    columns = {"flss": means.mean(axis=2), "sample_sd": means.std(axis=2, ddof=1)}
+    table = {name: (("curve", "velocity"), values, {"units": "1"}) for name, values in columns.items()}
+    size = {"samples": f"{SAMPLES} of {lost.sizes['start'] // SAMPLES} starts"}
+    data = xr.Dataset(table, {"velocity": lost.velocity, "curve": lost.curve}, size)
     for name, (label, style) in curves.items():
         one = data.sel(curve=name).dropna("velocity")
         look: dict[str, Any] = {"linewidth": 1.3, "capsize": 3} | style
@@ -162,19 +165,6 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
     axes.set(xlabel="velocity $V$", ylabel="FLSS", xlim=(0, 1), ylim=(-0.02, 1.04))
     axes.legend(frameon=False, fontsize=10)
     return figure, data
-
-
-def _samples(lost: "xr.DataArray") -> "xr.Dataset":
-    """Return mean and standard deviation over the samples of starts, (velocity,); NaN without a weight set."""
-    import xarray as xr
-
-    known = (lost.values != NO_SET).all(axis=1)
-    means = lost.values.reshape(lost.sizes["velocity"], SAMPLES, -1).mean(axis=2)
-    means[~known] = np.nan
-    size = lost.sizes["start"] // SAMPLES
-    columns = {"flss": means.mean(axis=1), "sample_sd": means.std(axis=1, ddof=1)}
-    table = {name: ("velocity", values, {"units": "1"}) for name, values in columns.items()}
-    return xr.Dataset(table, {"velocity": lost.velocity}, {"samples": f"{SAMPLES} of {size} starts"})
 
 
 Draw = Callable[[Measurements], "tuple[Figure, xr.Dataset]"]

@@ -64,8 +64,6 @@ class Problem:
     shows a way if all starts lose stability."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.form, Form):
-            raise InputError(f"form = {self.form!r:.80}; expected a NetworkForm or a FieldsForm")
         choice("over", self.over, get_args(Over))
         choice("ties", self.ties, get_args(Ties))
         if self.low > self.high:
