@@ -287,19 +287,10 @@ def test_bad_actions_are_refused(kind):
     walking.step(zeros)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("velocity", 1.5),
-        ("actions", "feet"),
-        ("render_mode", "human"),
-        ("num_envs", 0),
-        ("autoreset_mode", "never"),
-    ],
-)
-def test_bad_settings_are_refused(name, value):
+@pytest.mark.parametrize("name", ["actions", "render_mode", "autoreset_mode"])
+def test_bad_settings_are_refused(name):
     with pytest.raises(InputError, match=name):
-        StickInsects(**{name: value})
+        StickInsects(**{name: "nothing"})
 
 
 def test_bad_seeds_and_masks_are_refused():
