@@ -111,12 +111,19 @@ class StudyCommand(Command):
 
     def options(self, name: str, help: bool = True) -> type:
         self.sources = (*self.own, self.study, Results, Output, *self.planning, Workers, Figures)  # pyright: ignore
-        self.usual = {**self.usual, "out": Path("results") / name}  # pyright: ignore
+        self.usual = {"out": Path("results") / name, **self.usual}  # pyright: ignore
         return super().options(name, help)
 
     def build(self, given: SimpleNamespace) -> "Study":
         """Return the study that the options describe."""
         return build(imported(self.study), given)
+
+    def result(self, given: SimpleNamespace, study: Any) -> "xr.Dataset":
+        """Run the study."""
+        from hexmj.sweep import run_study
+
+        with at_work(given, given.command[0]) as execution:
+            return run_study(study, given.out and given.out / "walks", **execution)
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """Return the JSON answer: by default everything but single starts."""
@@ -131,17 +138,16 @@ class StudyCommand(Command):
         return []
 
     def run(self, given: SimpleNamespace) -> Answer:
-        """Run the study in the results' folder and write the files."""
+        """Run the study, and write the files if there is a folder for results."""
         from hexmj.io import results_folder, save
-        from hexmj.sweep import run_study
 
-        study, folder = self.build(given), results_folder(given.out)
-        with at_work(given, given.command[0]) as execution:
-            result = run_study(study, folder / "walks", **execution)
-        files = [save(result, folder / self.data.format(**vars(given)))]
-        for name, which in self.figures.items():
-            files.append(draw(result, folder / f"{name.format(**vars(given))}.{given.format}", which))
-        files += self.others(given, result)
+        study, folder = self.build(given), given.out and results_folder(given.out)
+        result, files = self.result(given, study), list[Path]()
+        if folder:
+            files.append(save(result, folder / self.data.format(**vars(given))))
+            for name, which in self.figures.items():
+                files.append(draw(result, folder / f"{name.format(**vars(given))}.{given.format}", which))
+            files += self.others(given, result)
         manifest = self.manifest.format(**vars(given))
         return Answer(self.summary(result), self.shown(study, result), files, manifest=manifest, result=result)
 

@@ -9,30 +9,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.cli.command import Answer, Command, StudyCommand, at_work, draw, filmed
+from hexmj.cli.command import Answer, Command, StudyCommand, draw, filmed
 from hexmj.cli.options import (
     Figures,
     Output,
     Planning,
     Threads,
-    Workers,
-    acceleration,
     build,
-    conditions,
     controller,
     no_effect,
-    stride,
 )
 from hexmj.cli.output import (
     Column,
     four_digits,
     grid,
     report_line,
-    table,
 )
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,55 +94,56 @@ class FlssOptions:
     conditions: Conditions = Conditions()
 
 
-class Flss(Command):
+class Flss(StudyCommand):
     """Measure the FLSS of a controller over velocities, kinematic or physical. A run with --out that was stopped
     resumes if it is repeated."""
 
-    sources = (FlssOptions, "measures.kinematic:KinematicFlss", Output, Planning, Workers, Figures)
+    study = "measures.kinematic:KinematicFlss"
+    own = (FlssOptions,)
+    usual = {"out": None}  # noqa: RUF012
+    data = "flss.nc"
+    figures = {"flss": "flss"}  # noqa: RUF012
     examples = ("--velocity 0.5", "--physical --velocity 0.3 0.5 --starts 50 --out results/flss")
 
-    def run(self, given: SimpleNamespace) -> Answer:
-        from hexmj.io import attributes, results_folder, save
-        from hexmj.measures.compare import physical_report
-
+    def build(self, given: SimpleNamespace) -> Any:
         if not given.physical:
             no_effect(given, [*PHYSICAL, "feedback"], "without --physical")
-        elif given.range_of is not None:
-            raise InputError(f"--range-of = {given.range_of} has no effect with --physical")
-        if given.out:
-            results_folder(given.out)
-        result = self.measured(given).assign_attrs(attributes({"model": given.controller, "physical": given.physical}))
-        files: list[Path] = []
-        if given.out:
-            files = [save(result, given.out / "flss.nc"), draw(result, given.out / f"flss.{given.format}")]
-        names = [str(name) for name, values in result.items() if values.dims == ("velocity",)]
-        report = physical_report(result) if given.physical else {}
-        lists = {name: result[name].values.tolist() for name in ["velocity", *names]}
-        columns = [name for name in names if result[name].notnull().any()]
-        rows = [
-            (f"{v:g}", *(four_digits(result[name].sel(velocity=v).item()) for name in columns))
-            for v in result.velocity.values
-        ]
-        lines = [f"{'physical' if given.physical else 'kinematic'} FLSS of {given.controller}"]
-        lines += [table(("V", *columns), rows), *([report_line(report)] if report else [])]
-        return Answer(lists | ({"report": report} if report else {}), lines, files, result=result)
+            return super().build(given)
+        from hexmj.measures.compare import PhysicalFlss
 
-    def measured(self, given: SimpleNamespace) -> "xr.Dataset":
-        """Return the FLSS over velocities."""
-        from hexmj.measures.kinematic import RANGE, flss
+        no_effect(given, ["range_of"], "with --physical", {"range_of": None})
+        return build(PhysicalFlss, given, controllers={given.controller: controller(given, given.controller)})
 
-        walks: Any = {name: getattr(given, name) for name in ("observation_time", "seed")}
-        walks |= {"stride": stride(given), "acceleration": acceleration(given)}
-        planned, folder = controller(given, given.controller), given.out and given.out / "walks"
-        with at_work(given, f"{'physical' if given.physical else 'kinematic'} FLSS") as execution:
-            how: Any = walks | execution | {"folder": folder}
-            if given.physical:
-                from hexmj.measures.compare import physical_flss
+    def result(self, given: SimpleNamespace, study: Any) -> "xr.Dataset":
+        from hexmj.io import attributes
 
-                n_starts = 200 if given.starts is None else given.starts
-                return physical_flss(planned, given.velocity, n_starts=n_starts, conditions=conditions(given), **how)
-            how |= {} if given.starts is None else {"n_starts": given.starts}
-            return flss(planned, given.velocity, range_of=RANGE if given.range_of is None else given.range_of, **how)
+        made = {"model": given.controller, "physical": given.physical}
+        return super().result(given, study).assign_attrs(attributes(made))
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        from hexmj.measures.compare import physical_report
+
+        lists = {name: result[name].values.tolist() for name in ["velocity", *_over_velocity(result)]}
+        return lists | ({"report": physical_report(result)} if "fall" in result else {})
+
+    def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
+        from hexmj.measures.compare import physical_report
+
+        columns: Any = {name: _four_digits(name) for name in _over_velocity(result) if result[name].notnull().any()}
+        physical = "fall" in result
+        yield f"{'physical' if physical else 'kinematic'} FLSS of {result.attrs['model']}"
+        yield grid(result, ("velocity",), columns)
+        if physical:
+            yield report_line(physical_report(result))
+
+
+def _over_velocity(result: "xr.Dataset") -> list[str]:
+    """Return the variables with one number for each velocity."""
+    return [str(name) for name, values in result.items() if values.dims == ("velocity",)]
+
+
+def _four_digits(name: str) -> Column:
+    return lambda data: four_digits(data[name].item())
 
 
 @dataclass(frozen=True)

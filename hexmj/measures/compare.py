@@ -73,6 +73,23 @@ class Comparison(Study):
         return self.labelled(table, "compare")
 
 
+@dataclass(frozen=True)
+class PhysicalFlss(Comparison):
+    """Physical FLSS of one controller over velocities."""
+
+    n_starts: int = field(default=200, kw_only=True)
+    """Number of random starts, the same for every velocity."""
+
+    def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
+        """Return the table of `physical_flss`."""
+        result = super().result(data)
+        fell = tables.losses_by_sample(np.isfinite(result.fall.values[0]))
+        table = tables.frequency_table(fell, result.sizes["start"], result.velocity.values, result.duration.values)
+        wanted = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
+        reported = result.isel(controller=0, drop=True)[[*wanted, "fall", *BESIDE.values(), *REPORTED]]
+        return table.assign(reported.drop_vars("duration").data_vars).assign_attrs(result.attrs | {"study": "flss"})
+
+
 def compare(
     controllers: Controller | Mapping[str, Controller],
     velocities: Sequence[float] | float,
@@ -84,6 +101,7 @@ def compare(
     stride: Stride | None = None,
     acceleration: Acceleration | None = None,
     folder: Path | None = None,
+    study: type[Comparison] = Comparison,
     **how: Unpack[Execution],
 ) -> "xr.Dataset":
     """Return the kinematic, measured and physical FLSS of controllers over velocities, on the same starts.
@@ -93,6 +111,7 @@ def compare(
         velocities: V_r, one or several (final ones when accelerating), each 0 <= V < 1.
         n_starts, observation_time, seed, conditions, stride, acceleration: fields of `Comparison`.
         folder: caches what is finished; None caches nothing.
+        study: `Comparison`, or a subclass with another table.
         how: executor, threads and progress, see `sweep.Execution`; the result does not depend on it.
 
     Returns:
@@ -106,10 +125,9 @@ def compare(
         SimulationError: a walk does not settle, or diverges.
     """
     named = controllers if isinstance(controllers, Mapping) else {getattr(controllers, "name", "?"): controllers}
-    several: Any = np.atleast_1d(velocities).tolist()
     walks: Any = {"n_starts": n_starts, "seed": seed, "conditions": conditions or Conditions()}
-    study = Comparison(named, several, observation_time, acceleration, stride=stride or Stride(), **walks)
-    return run_study(study, folder, **how)
+    walks |= {"velocities": np.atleast_1d(velocities).tolist(), "stride": stride or Stride()}
+    return run_study(study(named, observation_time=observation_time, acceleration=acceleration, **walks), folder, **how)
 
 
 def physical_flss(
@@ -130,12 +148,7 @@ def physical_flss(
     Raises:
         InputError, SimulationError: as `compare`.
     """
-    result = compare(controller, velocities, n_starts=n_starts, **options)
-    fell = tables.losses_by_sample(np.isfinite(result.fall.values[0]))
-    table = tables.frequency_table(fell, result.sizes["start"], result.velocity.values, result.duration.values)
-    wanted = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
-    reported = result.isel(controller=0, drop=True)[[*wanted, "fall", *BESIDE.values(), *REPORTED]]
-    return table.assign(reported.drop_vars("duration").data_vars).assign_attrs(result.attrs | {"study": "flss"})
+    return compare(controller, velocities, n_starts=n_starts, study=PhysicalFlss, **options)
 
 
 def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr.Dataset":
