@@ -1,6 +1,7 @@
-"""Observations and rewards of all insects at once.
+"""Tip targets, observations and rewards of all insects at once, in compiled passes.
 
-`tests/plain_observations.py` has the same formulas in plain NumPy, and a test compares the two.
+For one insect a dozen calls of NumPy take as long as its physics. `tests/plain_observations.py` has the same formulas
+in plain NumPy, and a test compares the two.
 """
 
 from typing import Any, NamedTuple
@@ -43,29 +44,27 @@ class Observer:
 
     def __init__(self, compiled: CompiledBody, task: Task) -> None:
         """Prepare the layout of the observations, which `task` describes."""
-        self._compiled, self._command, self._no_foot = compiled, task.command, compiled.body.lengths.no_foot_margin
-        bounds = observation_bounds(compiled, task)
-        self._low, self._high = (np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1))
+        bounds, columns = observation_bounds(compiled, task), compiled.columns
+        self._bounds = np.array([np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1)])
+        self._corners, no_foot = compiled.trunk_corners, compiled.body.lengths.no_foot_margin
+        self._layout = compiled.joints, columns.foot.start, columns.centre_of_mass.start, task.command, no_foot
         ends = np.cumsum([low.size for low, _ in bounds.values()]).tolist()
         self._fields = [
             (name, (..., slice(end - low.size, end)), low.shape if low.ndim > 1 else ())
             for (name, (low, _)), end in zip(bounds.items(), ends, strict=True)
         ]
 
-    def observe(self, places: Places, standing: np.ndarray, planned: Planned) -> np.ndarray:
-        """Return all observations of some insects, (n, number); `standing` are feet that stand, (n, leg)."""
-        (qpos, qvel, *_), count, columns = places, len(standing), self._compiled.columns
-        relative = np.empty((count, 24))
-        where = columns.foot.start, columns.centre_of_mass.start
-        measure(tuple(places), standing, *self._compiled.trunk_corners, where, relative)
-        relative[:, 22], relative[:, 23] = np.maximum(relative[:, 22], self._no_foot), self._command
-        parts = (
-            qpos[:, columns.qpos], qvel[:, columns.qvel], qpos[:, 3:ROOT_QPOS], relative[:, :3], qvel[:, 3:ROOT_QVEL],
-            relative[:, 3:22], standing, relative[:, 22:], planned.stance, planned.tips.reshape(count, 18),
-            planned.missed,
-        )  # fmt: skip
-        flat = np.concatenate(parts, axis=1)[:, : len(self._low)]
-        return np.minimum(np.maximum(flat, self._low), self._high)
+    def observe(self, places: tuple[Any, ...], standing: np.ndarray, planned: tuple[Any, ...]) -> np.ndarray:
+        """Return all observations of some insects, (n, number).
+
+        Args:
+            places: `Places` as a plain tuple, which compiled code receives faster.
+            standing: feet that stand, (n, leg).
+            planned: `Planned` as a plain tuple.
+        """
+        flat = np.empty((len(standing), self._bounds.shape[1]))
+        observe(places, self._corners, standing, planned, self._bounds, self._layout, flat)
+        return flat
 
     def named(self, flat: np.ndarray) -> dict[str, np.ndarray]:
         """Return observations, (..., number), by name and in their shapes."""
@@ -77,56 +76,110 @@ class Observer:
 
 
 @jitted
-def measure(places: Any, standing: Any, corners: Any, radii: Any, columns: Any, relative: Any) -> None:
-    """Measure velocity along the heading, clearance, tips in the root frame, and stability margin.
+def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
+    """Return the tip targets of some insects for their next step, (n, substep, leg, axis) [mm].
 
     Args:
-        places: `Places` of the insects.
-        standing: feet that stand, (n, leg).
-        corners: of the trunk in the root frame, (corner, axis) [mm].
-        radii: of the trunk at its corners, (corner,) [mm].
-        columns: first sensor columns of feet and centre of mass.
-        relative: filled in this order, (n, 3 + 1 + leg * axis + 1 or more).
+        wanted: values of their actions, (n, number).
+        ids: insects, (n,).
+        ahead: planned tips (insect, step, substep, leg, axis), stance (insect, step, leg), and the index of the next
+            step, (insect,), which is advanced.
+        planned: `Planned` of all insects, which is updated.
+        offset: whether actions are offsets to the tips.
     """
-    (qpos, qvel, rotation, sensors), (foot, centre) = places, columns
-    around, margin = np.empty((1, 6, 2)), np.empty(1)
-    for n in range(len(relative)):
-        seen, turn, v, s = relative[n], rotation[n], qvel[n], sensors[n]
-        angle = np.arctan2(turn[1, 0], turn[0, 0])
-        cosine, sine = np.cos(angle), np.sin(angle)
-        seen[0], seen[1], seen[2] = cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2]
-        seen[3] = np.inf
-        for c in range(len(corners)):
-            up = turn[2, 0] * corners[c, 0] + turn[2, 1] * corners[c, 1] + turn[2, 2] * corners[c, 2]
-            seen[3] = min(seen[3], qpos[n, 2] + up - radii[c])
+    tips_ahead, stance_ahead, at = ahead
+    tips = np.empty((len(ids), tips_ahead.shape[2], 6, 3))
+    for i, n in enumerate(ids):
         for leg in range(6):
-            for k in range(3):
-                seen[4 + 3 * leg + k] = 0.0
-                for axis in range(3):
-                    seen[4 + 3 * leg + k] += (s[foot + 3 * leg + axis] - qpos[n, axis]) * turn[axis, k]
-            for axis in range(2):
-                around[0, leg, axis] = s[foot + 3 * leg + axis] - s[centre + axis]
-        margins(around, standing[n : n + 1], margin)
-        seen[22] = margin[0]
+            planned[0][n, leg], planned[2][n, leg] = stance_ahead[n, at[n], leg], 0.0
+            for axis in range(3):
+                for sub in range(tips.shape[1]):
+                    tips[i, sub, leg, axis] = tips_ahead[n, at[n], sub, leg, axis]
+                    planned[1][n, leg, axis] = tips[i, sub, leg, axis]
+                    tips[i, sub, leg, axis] += wanted[i, 3 * leg + axis] if offset else 0.0
+        at[n] += 1
+    return tips
 
 
 @jitted
-def judge(ids: Any, sensors: Any, places: Any, trunk: Any, command: float, reward: Any, fell: Any) -> None:
-    """Compute rewards and falls of the insects that took a step.
+def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any) -> None:
+    """Write all observations into `flat`, (n, number), in the order of `task.observation_bounds`.
 
     Args:
+        places: `Places` of the insects.
+        corners: of the trunk, (corner, axis), and their radii, (corner,) [mm].
+        standing: feet that stand, (n, leg).
+        planned: `Planned` of the insects.
+        bounds: least and greatest value of every number, (2, number).
+        layout: number of joints, first sensor columns of feet and centre of mass, the command, and the margin without
+            a foot in contact.
+    """
+    joints, foot, centre, command, no_foot = layout
+    around, margin = np.empty((1, 6, 2)), np.empty(1)
+    for n in range(len(flat)):
+        q, v, turn, s, seen = places[0][n], places[1][n], places[2][n], places[3][n], flat[n]
+        for j in range(joints):
+            seen[j], seen[joints + j] = q[ROOT_QPOS + j], v[ROOT_QVEL + j]
+        at = 2 * joints
+        for k in range(4):
+            seen[at + k] = q[3 + k]
+        angle = np.arctan2(turn[1, 0], turn[0, 0])
+        cosine, sine = np.cos(angle), np.sin(angle)
+        seen[at + 4], seen[at + 5], seen[at + 6] = cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2]
+        for k in range(3):
+            seen[at + 7 + k] = v[3 + k]
+        seen[at + 10] = np.inf
+        for c in range(len(corners[0])):
+            x, y, z = corners[0][c]
+            up = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z
+            seen[at + 10] = min(seen[at + 10], q[2] + up - corners[1][c])
+        at += 11
+        for leg in range(6):
+            for k in range(3):
+                seen[at + 3 * leg + k] = 0.0
+                for axis in range(3):
+                    seen[at + 3 * leg + k] += (s[foot + 3 * leg + axis] - q[axis]) * turn[axis, k]
+            for axis in range(2):
+                around[0, leg, axis] = s[foot + 3 * leg + axis] - s[centre + axis]
+            seen[at + 18 + leg], seen[at + 26 + leg] = standing[n, leg], planned[0][n, leg]
+            for k in range(3):
+                seen[at + 32 + 3 * leg + k] = planned[1][n, leg, k]
+            if len(seen) > at + 50:
+                seen[at + 50 + leg] = planned[2][n, leg]
+        margins(around, standing[n : n + 1], margin)
+        seen[at + 24], seen[at + 25] = max(margin[0], no_foot), command
+        for i in range(len(seen)):
+            seen[i] = min(max(seen[i], bounds[0, i]), bounds[1, i])
+
+
+@jitted
+def judge(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time: Any, result: Any) -> bool:
+    """Compute rewards and ends of the insects that took a step.
+
+    Args:
+        places: `Places` of all insects after the step.
         ids: insects that took the step, (n,).
         sensors: at the beginning of each substep, (n, substep, column).
-        places: `Places` of all insects after the step.
         trunk: first column of the contacts of the trunk's parts, and the one after the last.
         command: commanded velocity [mm/s].
-        reward: filled for these insects, (insect,).
-        fell: filled for these insects, (insect,).
+        time: steps that all insects have taken, (insect,), which are advanced, and the steps of an episode.
+        result: rewards, falls and ends of time, each (insect,), filled with 0 before; updated.
+
+    Returns:
+        Whether any episode has ended.
     """
-    _, qvel, rotation, now = places
+    (_, qvel, rotation, now), (done, steps), (reward, fell, over), ended = places, time, result, False
     for i, n in enumerate(ids):
-        fell[n] = (now[n, trunk[0] : trunk[1]] > 0).any() or (sensors[i, :, trunk[0] : trunk[1]] > 0).any()
-        reward[n] = 0.0 if fell[n] else worth(qvel[n], rotation[n], command)
+        done[n] += 1
+        for column in range(trunk[0], trunk[1]):
+            fell[n] |= now[n, column] > 0
+            for t in range(sensors.shape[1]):
+                fell[n] |= sensors[i, t, column] > 0
+        over[n] = done[n] == steps and not fell[n]
+        if not fell[n]:
+            reward[n] = worth(qvel[n], rotation[n], command)
+        ended |= fell[n] or over[n]
+    return ended
 
 
 @jitted

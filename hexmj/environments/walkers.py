@@ -17,10 +17,10 @@ from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.bodies.kinematics import standing_tips
 from hexmj.controllers.planning import advanced, begin
 from hexmj.controllers.protocol import FeedbackPlan, Plan
-from hexmj.environments.observing import Observer, Places, Planned, judge
+from hexmj.environments.observing import Observer, Places, Planned, judge, order
 from hexmj.environments.task import Task, action_bounds
 from hexmj.errors import InputError
-from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, stepping, walk_error
+from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, walk_error
 from hexmj.physics.foot_path import TipTargets, check_made_for, hold
 from hexmj.physics.rollout import Senses
 from hexmj.physics.settle import Settling
@@ -88,6 +88,7 @@ class Walkers:
     def look(self, bodies: Bodies) -> None:
         """Refer to the arrays of these bodies, which change with each step."""
         self.bodies, self.places = bodies, Places(bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors)
+        self._passed = tuple(self.places), tuple(self._planned)  # compiled code receives plain tuples faster
         self._take = (
             bodies.take if isinstance(bodies, Alone) else FineSteps.of(bodies, self._substeps, self._compiled).take
         )
@@ -157,24 +158,19 @@ class Walkers:
         self.begun = False  # if the step fails, the other insects may have taken it or not
         for group in self._together:
             self._plan(group)
-        ids, substeps, planned = self._ids, self._substeps, self._planned
-        tips_ahead, stance_ahead, at = self._ahead
-        step = at[ids]
-        tips, planned.stance[ids], at[ids] = tips_ahead[ids, step], stance_ahead[ids, step], step + 1
-        planned.tips[ids] = tips[:, -1]
-        if self._task.actions == "tips":
-            tips += wanted.reshape(-1, 1, 6, 3)
+        ids, substeps, offset = self._ids, self._substeps, self._task.actions == "tips"
+        tips = order(wanted, ids, self._ahead, self._passed[1], offset)
+        if offset:
             joints, reachable = self._compiled.inverse(tips)
-            planned.missed[ids] = 0.0
             if not reachable.all():
-                planned.missed[ids] = substeps - reachable.sum(axis=1)
+                self._planned.missed[ids] = substeps - reachable.sum(axis=1)
                 hold(joints.swapaxes(0, 1), self._joints[ids])
             self._joints[ids] = joints[:, -1]
             control = joints.reshape(len(ids), substeps, -1)
         else:
             control = wanted[:, np.newaxis].repeat(substeps, axis=1)
         if self._task.conditions.grasp:
-            stance = planned.stance[ids, np.newaxis]
+            stance = self._planned.stance[ids, np.newaxis]
             control = np.concatenate([control, stance.repeat(substeps, axis=1)], axis=2)
         return control
 
@@ -182,22 +178,22 @@ class Walkers:
         """Return the result of a step, from its sensors and forces, (n, substep, ...)."""
         ids, acted, columns = self._ids, self._nothing(), self._compiled.columns
         self._senses.feel(ids, shown["sensors"], shown["force"])
-        trunk, places = (columns.trunk.start, columns.trunk.stop), tuple(self.places)
-        judge(ids, shown["sensors"], places, trunk, self._task.command, acted.reward, acted.terminated)
-        self._done[ids] += 1
-        acted.truncated[ids] = self._done[ids] == self._steps
+        trunk, time = (columns.trunk.start, columns.trunk.stop), (self._done, self._steps)
+        ended = judge(self._passed[0], ids, shown["sensors"], trunk, self._task.command, time, tuple(acted))
         if self._task.conditions.ground in WITH_ENDS:
             feet = self.places.sensors[ids, columns.foot].reshape(-1, 6, 3)
-            acted.truncated[ids] |= beyond_the_ground(self._task.conditions, feet).any(axis=1)
-        acted.truncated[acted.terminated] = False
-        if (ended := acted.terminated | acted.truncated).any():
-            self._leave(np.flatnonzero(ended))
+            beyond = beyond_the_ground(self._task.conditions, feet).any(axis=1)
+            acted.truncated[ids] |= beyond & ~acted.terminated[ids]
+            ended |= bool(beyond.any())
+        if ended:
+            self._leave(np.flatnonzero(acted.terminated | acted.truncated))
         self.begun = True
         return acted
 
     def observations(self) -> np.ndarray:
         """Return the observations of all insects, (insect, number); `observer.named` names them."""
-        return self.observer.observe(self.places, self._senses.standing(), self._planned)
+        places, planned = self._passed
+        return self.observer.observe(places, self._senses.standing(), planned)
 
     def _leave(self, ids: np.ndarray) -> None:
         """End the episodes of some insects."""
@@ -259,7 +255,7 @@ class Alone:
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
         """Take one step of the plan; only if a foot strikes the ground, by `substeps.FineSteps.take`."""
         rolled = self.roll(ids, control, 1)
-        if not strikes(self._compiled.depth(rolled.feet), control.shape[1], self._allowed).any():
+        if not np.count_nonzero(strikes(self._compiled.depth(rolled.feet), control.shape[1], self._allowed)):
             return {"sensors": rolled.sensors, "force": rolled.force}
         self.put(ids, rolled.before)
         return FineSteps.of(self, control.shape[1], self._compiled).take(ids, control)
@@ -271,18 +267,17 @@ class Alone:
         sensors = np.empty((1, count + 1, len(self._sensors)))
         force = np.empty((1, count, len(self._force)))
         mujoco.mj_getState(model, data, before[0], _STATE)
-        with stepping():
-            if parts > 1:
-                model = copy(model)  # another thread may step with the model
-                model.opt.timestep /= parts
-                model.pair_solref[:, 0] = 2 * model.opt.timestep
-                mujoco.mj_step1(model, data)
-            for k in range(count):
-                self._control[:] = control[0, k]
-                (mujoco.mj_step if k else mujoco.mj_step2)(model, data)
-                sensors[0, k], force[0, k] = self._sensors, self._force  # places at the beginning of the step
-            mujoco.mj_step1(self.model, data)
-        if self._warned.any():
+        if parts > 1:
+            model = copy(model)  # another thread may step with the model
+            model.opt.timestep /= parts
+            model.pair_solref[:, 0] = 2 * model.opt.timestep
+            mujoco.mj_step1(model, data)
+        for k in range(count):
+            self._control[:] = control[0, k]
+            (mujoco.mj_step if k else mujoco.mj_step2)(model, data)
+            sensors[0, k], force[0, k] = self._sensors, self._force  # places at the beginning of the step
+        mujoco.mj_step1(self.model, data)
+        if np.count_nonzero(self._warned):
             raise self._diverged(before[0])
         sensors[0, count] = self._sensors
         feet = sensors[:, :, self._foot].reshape(1, count + 1, 6, 3)
