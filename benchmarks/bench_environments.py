@@ -51,7 +51,7 @@ def test_one(measure, who, actions, dt):
 
     work = {"hexmj": ours, "the dm_env interface": dm_env}.get(who, bare)
     what = f"environment, 1 insect, {actions}, {task.substeps} substeps"
-    measure(work, what, who, amount=STEPS, unit="steps/s", ratio=0.25, rounds=7)
+    measure(work, what, who, amount=STEPS, unit="steps/s", ratio=0.5, rounds=7)
 
 
 @pytest.mark.parametrize("who", ["hexmj", "physical walks"])
