@@ -148,27 +148,20 @@ def interval(data: "xr.Dataset", name: str) -> tuple[np.ndarray, np.ndarray]:
     return middle, np.stack([middle - low, high - middle])
 
 
-def heat_map(
-    axes: "Axes", values: np.ndarray, texts: np.ndarray, faint: np.ndarray | None = None, **style: Any
-) -> "AxesImage":
+def heat_map(axes: "Axes", values: np.ndarray, texts: np.ndarray, **style: Any) -> "AxesImage":
     """Draw numbers as colours, without a frame, and a text in every cell.
 
     Args:
         axes: to draw in.
         values: (row, column); NaN has no colour.
         texts: (row, column).
-        faint: where the text is grey on light colours, (row, column); elsewhere it is bold. By default all are plain.
         style: options of `Axes.imshow`.
     """
     image = axes.imshow(values, aspect="auto", **style)
     shade = image.to_rgba(values)[..., :3] @ [0.3, 0.59, 0.11]
     for row, column in np.argwhere(texts != ""):
-        weak, light = faint is not None and faint[row, column], shade[row, column]
-        white = light < 0.5 and np.isfinite(values[row, column])
-        colour = "white" if white else "0.4" if weak and light > 0.85 else "0.1"
-        weight = "normal" if faint is None or weak else "bold"
-        middle: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "linespacing": 1.1}
-        axes.text(column, row, str(texts[row, column]), color=colour, fontweight=weight, **middle)
+        colour = "white" if shade[row, column] < 0.5 and np.isfinite(values[row, column]) else "0.1"
+        axes.text(column, row, str(texts[row, column]), color=colour, ha="center", va="center", fontsize=8)
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
     return image

@@ -35,8 +35,8 @@ MEASURES = {
 }
 """Measure -> the event that is counted."""
 
-NOTES = {NOTHING: "no walk is left", FEWER: "walks are missing that diverged or were out of reach"}
-"""Marks of a cell without a number, and of one with missing walks -> their meaning."""
+NOTES = f"* 95 % interval excludes 0; {NOTHING} no walk is left; {FEWER} walks diverged or were out of reach"
+"""Explanation of the marks."""
 
 
 def wholes(names: Sequence[str]) -> dict[str, Controller]:
@@ -130,35 +130,32 @@ def ablation_figure(result: "xr.Dataset") -> "Figure":
     """Draw frequencies of the wholes, and below each how much more often events happen without a part."""
     rows, columns = result.sizes["controller"], result.sizes["velocity"]
     figure = picture(2.6 + 0.58 * len(MEASURES) * max(4, columns), 1.9 + 0.27 * rows)
-    panels, used = figure.subplots(1, len(MEASURES), sharey=True), set[str]()
+    panels = figure.subplots(1, len(MEASURES), sharey=True)
     wholes = result.controller.values == result.whole.values
     for panel, (measure, title) in zip(panels, MEASURES.items(), strict=True):
         data = result.sel(measure=measure).transpose("controller", "velocity", ...)
-        cells = [cell_text(data.isel(controller=row, velocity=v)) for row, v in np.ndindex(rows, columns)]
-        texts, sure = (np.reshape(values, (rows, columns)) for values in zip(*cells, strict=True))
-        used |= {mark for mark in NOTES for text, _ in cells if mark in text}
+        texts = [cell_text(data.isel(controller=row, velocity=v)) for row, v in np.ndindex(rows, columns)]
         shown = np.where(wholes[:, None], np.nan, data.more.values)
-        heat_map(panel, shown, texts, ~sure, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+        heat_map(panel, shown, np.reshape(texts, (rows, columns)), cmap="RdBu_r", vmin=-1.0, vmax=1.0)
         panel.set_title(f"{measure}\n{title}", fontsize=9)
         velocity_columns(panel, result.velocity.values)
         for row in np.flatnonzero(result.whole.values[1:] != result.whole.values[:-1]):
             panel.axhline(row + 0.5, color="0.3", linewidth=0.8)
     panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values])
-    heading = "What a part buys: frequencies of the whole, and differences without it (bold: 95 % interval excludes 0)"
+    heading = "What a part buys: frequencies of the whole, and differences without it"
     physical, gaits = result.attrs["physical_starts"], min(result.attrs["starts"], REGIMES)
     head(figure, heading, f"{caption(result)}; {physical} of them in physics, {gaits} for the gait")
-    if used:
-        figure.supxlabel("; ".join(f"{mark} {note}" for mark, note in NOTES.items() if mark in used), fontsize=8)
+    figure.supxlabel(NOTES, fontsize=8)
     return figure
 
 
-def cell_text(cell: "xr.Dataset") -> tuple[str, bool]:
-    """Return the text of one controller, measure and velocity, and whether it stands out."""
+def cell_text(cell: "xr.Dataset") -> str:
+    """Return the text of one controller, measure and velocity."""
     whole = cell.controller.item() == cell.whole.item()
     value = (cell.frequency if whole else cell.more).item()
     if np.isnan(value):
-        return NOTHING, False
+        return NOTHING
     text = f"{value:.2f}" if whole else f"{np.round(value, 2) + 0.0:+.2f}".replace("-", "\N{MINUS SIGN}")
     fewer = cell.measure.item() == "physical" and cell.frequency_starts.item() < cell.attrs["physical_starts"]
-    sure = whole or cell.more_low.item() > 0 or cell.more_high.item() < 0
-    return text + (FEWER if fewer else ""), sure
+    sure = not whole and (cell.more_low.item() > 0 or cell.more_high.item() < 0)
+    return text + ("*" if sure else "") + (FEWER if fewer else "")

@@ -38,7 +38,10 @@ PHYSICAL = ("push", "grasp")
 MOST_IMPULSE = 80.0
 """Largest impulse in multiples of m V_p; larger ones throw the insect into the air."""
 
-UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "linewidth": 1.4, "marker": "x", "markersize": 6}
+SHIFTS = dict(zip(STYLES, np.linspace(-0.012, 0.012, len(STYLES)), strict=True))
+"""How far their points stand beside the velocity."""
+
+UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "marker": "x", "label": "undisturbed"}
 ROWS = {"kinematic": "kinematic", "physical": "falls (physical)"}
 """Measure -> label of its row of panels."""
 
@@ -79,16 +82,14 @@ class DisturbedWalks(Study):
         low = self.initial_velocity if slows else 0.0
         if not ((v > 0) & (v >= low)).all():
             raise InputError(f"velocities = {v.tolist()}; expected above 0 and at least the initial velocity, {low:g}")
-        check_reached(v, self.stride, self.back if slows else None)
         if slows:
+            check_reached(v, self.stride, self.back)
             steps_within(time + self.back.duration(v), self.stride)
         if not self.kinematic and "push" in self.disturbances:
-            from hexmj.physics.pushes import steps_pushed
+            from hexmj.physics.pushes import can_push
 
-            lasts = steps_pushed(self.conditions, self.stride)
-            if (steps_within(time, self.stride) < lasts).any():
-                least = lasts * self.stride.dt
-                raise InputError(f"observation_time = {self.observation_time!r}; a push lasts {least:g} time units")
+            if not can_push(self.conditions, self.stride, time.min()):
+                raise InputError(f"observation_time = {self.observation_time!r}; a push lasts longer")
         _ = self.grasping, self.cases, [self._walks(velocity) for velocity in v]
 
     @property
@@ -212,15 +213,10 @@ def strategies_in_words(result: "xr.Dataset") -> str:
 
 def disturbed_figure(result: "xr.Dataset") -> "Figure":
     """Draw a column of panels for each disturbance and a row for each measure, with the observation time `whole`."""
-    from matplotlib.lines import Line2D
-
     names, strategies = result.disturbance.values, result.strategy.values
-    kinds, undisturbed = list(dict.fromkeys(names[names != NO_DISTURBANCE])), names == NO_DISTURBANCE
-    measures = [measure for measure in ROWS if measure in result]
+    kinds, measures = list(dict.fromkeys(names[names != NO_DISTURBANCE])), [name for name in ROWS if name in result]
     figure = picture(2.6 + 2.5 * len(kinds), 1.6 + 2.5 * len(measures))
     panels = figure.subplots(len(measures), len(kinds), sharex=True, sharey=True, squeeze=False)
-    used = [strategy for strategy in STYLES if strategy in strategies]
-    shifts = dict(zip(used, np.linspace(-0.012, 0.012, len(used)), strict=True))
     data = result.sel(observation_time="whole").sortby("velocity")
     v = data.velocity.values
     for (row, column), axes in np.ndenumerate(panels):
@@ -228,21 +224,19 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
         if row == 0:
             axes.set_title(_title(kind), fontsize=10)
         if measure == "kinematic" and kind.startswith("push"):
-            axes.axis("off")
-            axes.text(0.5, 0.5, "a plan does not\nnotice a push", transform=axes.transAxes, ha="center", color="0.4")
+            axes.axis("off")  # a plan does not notice a push
             continue
-        for case in np.flatnonzero(undisturbed):
+        for case in np.flatnonzero(names == NO_DISTURBANCE):
             axes.plot(v, data[measure].isel(case=case), **UNDISTURBED, zorder=5)
         for case in np.flatnonzero((names == kind) & ((strategies != "grasp") | (measure == "physical"))):
-            strategy = strategies[case]
-            frequency_curve(axes, v + shifts[strategy], data.isel(case=case), measure, **STYLES[strategy])
+            style = STYLES[strategies[case]] | {"label": strategies[case].replace("_", " ")}
+            frequency_curve(axes, v + SHIFTS[strategies[case]], data.isel(case=case), measure, **style)
         flss_axes(axes, v)
         axes.set_ylabel(f"FLSS, {ROWS[measure]}")
         axes.label_outer()
-    entries = [Line2D([], [], markersize=4, label=name.replace("_", " "), **STYLES[name]) for name in used]
-    entries += [Line2D([], [], **UNDISTURBED, label="undisturbed")] if undisturbed.any() else []
     least = min(int(data[f"{measure}_reached"].min()) for measure in measures)
-    figure.legend(handles=entries, **LEGEND, loc="outside right center", title="strategy")
+    handles, _ = panels[-1, -1].get_legend_handles_labels()
+    figure.legend(handles=handles, **LEGEND, loc="outside right center", title="strategy")
     words = "; ".join(filter(None, [caption(result, least), strategies_in_words(result)]))
     head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", words)
     return figure

@@ -23,8 +23,8 @@ SHARE: dict[str, Any] = {"vmin": 0.0, "vmax": 1.0}
 BAR: dict[str, Any] = {"format": "%g", "fraction": 0.03}
 """Options of a colour bar."""
 
-NAMED = 6
-"""Most entrants that a note names."""
+NOTES = f"{FEWER} of fewer starts: walks are missing that diverged or were out of reach; {NOTHING} not known"
+"""Explanation of the marks."""
 
 POINTS = {"range": ("#1b6ca8", "o", -0.14), "accelerated": ("#b3261e", "D", 0.14)}
 """Number over all velocities -> colour, mark and place in its row."""
@@ -53,7 +53,7 @@ def league_figure(result: "xr.Dataset") -> "Figure":
         starts, fewer = starts_in_words(shown[f"{name}_starts"].max().item()), name != "kinematic" and missing
         panels.append(Panel(f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer))
     heading = "The league: who loses static stability, and who falls; best in physics first, with the ranks there"
-    figure, axes, images = _drawn(heading, shown, panels, [in_figure(from_one(shown))])
+    figure, axes, images = _drawn(heading, shown, panels, in_figure(from_one(shown)))
     figure.colorbar(images[0], ax=axes[:3], location="bottom", label="share of the starts", **BAR, aspect=55)
     _dots(axes[3], shown)
     return figure
@@ -72,8 +72,7 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
         Panel("cost of transport\nof walks without a fall", shown.cost.values, "PuBu", missing, {}),
     ]
     heading = "The league: trials, steady-state gaits and costs; best in physics first"
-    unstable = f"{FEWER} among the trials: of fewer starts; plans not stable until halt, leg or push, or walks missing"
-    figure, axes, images = _drawn(heading, shown, panels, [unstable] * bool(some_are.any()))
+    figure, axes, images = _drawn(heading, shown, panels, "fewer starts in trials: or plans not stable until then")
     for ax, image in zip(axes, images, strict=True):
         figure.colorbar(image, ax=ax, location="bottom", **BAR, aspect=23).ax.locator_params(nbins=4)
     turned: dict[str, Any] = {"rotation": 60, "ha": "right", "rotation_mode": "anchor", "fontsize": 8}
@@ -82,13 +81,8 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
     return figure
 
 
-def _drawn(
-    heading: str, shown: "xr.Dataset", panels: list[Panel], notes: list[str]
-) -> "tuple[Figure, Any, list[AxesImage]]":
-    """Return a figure with a row for each entrant, its axes, and the heat maps in the first ones.
-
-    The meaning of the marks stands below the panels: a dash for no number, and a bullet for missing walks.
-    """
+def _drawn(heading: str, shown: "xr.Dataset", panels: list[Panel], note: str) -> "tuple[Figure, Any, list[AxesImage]]":
+    """Return a figure with a row for each entrant, its axes, and the heat maps in the first ones."""
     rows, images = shown.sizes["entrant"], []
     figure = picture(11.0, 2.6 + 0.22 * rows)
     axes = figure.subplots(1, COLUMNS, sharey=True)
@@ -102,19 +96,8 @@ def _drawn(
     axes[0].set_yticks(range(rows), names, fontsize=9)
     axes[0].set_ylim(rows - 0.5, -0.5)
     head(figure, heading, caption(shown))
-    unknown = any(np.isnan(panel.values).any() for panel in panels)
-    dash = [f"{NOTHING} not tried, or no walk or gait is left"] * unknown
-    figure.supxlabel("\n".join(filter(None, [*notes, *dash, _missing(shown)])), fontsize=8)
+    figure.supxlabel("; ".join(filter(None, [NOTES, note])), fontsize=8)
     return figure, axes, images
-
-
-def _missing(shown: "xr.Dataset") -> str:
-    """Return a note on missing walks, if there are any."""
-    of = shown.missing.sum("velocity")
-    found = [f"{in_figure(name)} {count:g}" for name, count in zip(of.entrant.values, of.values, strict=True) if count]
-    names = ", ".join(found[:NAMED]) + (f" and {len(found) - NAMED} more" if len(found) > NAMED else "")
-    note = f"{FEWER} of fewer starts: walks are missing that diverged or were out of reach (in all {names})"
-    return note if found else ""
 
 
 def _dots(axes: "Axes", shown: "xr.Dataset") -> None:
