@@ -58,10 +58,8 @@ class Gait:
         known, line = self.periodic, f"Gait(of {len(self.periodic)}: periodic {int(self.periodic.sum())}"
         line += f", stable {int(self.stable.sum())}"
         if known.any():
-            mean = {pair: float(circular_mean(self.phase[known, n])) for n, pair in enumerate(PAIRS) if pair in SHOWN}
-            phases = ", ".join(f"{pair} {round(one, 2) % 1.0:.2f}" for pair, one in mean.items())
-            line += f"; period {self.period[known].mean():.4g} time units, duty factor"
-            line += f" {self.duty_factor[known].mean():.2f}, phases {phases}"
+            duty = self.duty_factor[known].mean()
+            line += f"; period {self.period[known].mean():.4g} time units, duty factor {duty:.2f}"
         return f"{line})"
 
     def _repr_html_(self) -> str | None:
@@ -74,10 +72,6 @@ class Gait:
         protracted = (time[:, np.newaxis] - onset.ravel()) % 1.0  # time since the onset, in periods
         swings = protracted < 1.0 - self.duty_factor[start]
         return footfall_html(repr(self), time * self.period[start], swings, f"start {start}")
-
-
-SHOWN = ("1-2", "2-3", "1-4")
-"""Pairs whose phases `repr` shows."""
 
 
 def gait(walk: Walk) -> Gait:

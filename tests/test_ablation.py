@@ -1,7 +1,6 @@
 """Ablation: controllers without one of their parts."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -82,22 +81,6 @@ def test_a_file_is_called_by_its_short_name(tmp_path: Path, monkeypatch: pytest.
     models = wholes(["somewhere/found.toml"])
     assert [*models][:2] == ["found", "found-without-1"]
     assert models["found-without-1"] == hexmj.load_controller("somewhere/found.toml-without-1")
-
-
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("controllers", {"controllers": {}}),
-        ("velocities", {"velocities": (0.0, 0.5)}),
-        ("periods", {"periods": 3}),
-    ],
-)
-def test_bad_input_is_refused(name: str, wrong: dict) -> None:
-    with pytest.raises(InputError, match=name.replace("velocities", "velocit")):
-        settings: Any = {"controllers": switched("ldvs")} | wrong
-        Ablation(**settings)
-    with pytest.raises(InputError, match="controllers"):
-        wholes(["ldvs", "ldvs-without-3"])
 
 
 @pytest.mark.parametrize("name", ["ldvs-without-2", "ldvs-without-7", "walknet-with-2", "graham-without-1"])

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
 
-from hexmj import LDVS, UNCOORDINATED, Conditions, InputError, draw_starts
+from hexmj import LDVS, UNCOORDINATED, Conditions, draw_starts
 from hexmj.body import STICK_INSECT
 from hexmj.controllers.planning import begin
 from hexmj.legs import MIRROR
@@ -208,20 +208,6 @@ def test_phases_around_zero_have_their_mean_there():
     assert_allclose(result.isel(row=result.name.values == "duty factor")["mean"], 0.5)
     drawn: Any = biology_figure(result).axes[2]
     assert_allclose(np.asarray(drawn.lines[0].get_ydata(), dtype=float), 0.9555)
-
-
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("periods", {"periods": 3}),
-        ("vp", {"conditions": Conditions(vp=38.0)}),
-        ("grasp", {"conditions": Conditions(grasp=1.0)}),
-        ("ground", {"conditions": Conditions(ground="rough")}),
-    ],
-)
-def test_bad_input_is_refused(name, wrong):
-    with pytest.raises(InputError, match=name):
-        Biology(LDVS, **wrong)
 
 
 @pytest.mark.slow

@@ -347,14 +347,6 @@ def test_no_leg_is_stopped_of_a_controller_that_lifts_none():
         disturbance_of(STABLE, "leg", Stands(), V, STRIDE)
 
 
-@dataclass(frozen=True)
-class Unsteerable:
-    name: str = "unsteerable"
-
-    def begin(self, *given, **how):
-        return LDVS.begin(*given, **how)
-
-
 def test_any_weights_can_be_disturbed():
     """General weights have no hash."""
     controller = Cruse1998(general(HWS.weights))
@@ -367,27 +359,6 @@ def test_without_physics_pushes_and_grasping_are_left_out():
     assert [(case.disturbance, case.strategy) for case in cases] == [
         ("undisturbed", "none"), ("halt", "none"), ("halt", "reorganise"),
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("disturbances", {"disturbances": ["fall"]}),
-        ("disturbances", {"disturbances": ["halt", "halt"]}),
-        ("strategies", {"strategies": ["jump"]}),
-        ("impulses", {"impulses": [-1.0]}),
-        ("impulses", {"impulses": []}),
-        ("disturbances", {"disturbances": ["push"], "kinematic": True}),
-        ("velocities", {"velocities": [0.05]}),
-        ("observation_time", {"observation_time": 1.9}),
-        ("duration", {"recovery": 1e-7}),
-        ("grasp", {"conditions": Conditions(grasp=3.0)}),
-        ("unsteerable", {"controller": Unsteerable()}),
-    ],
-)
-def test_bad_input_is_refused(name, wrong):
-    with pytest.raises(InputError, match=name):
-        DisturbedWalks(**{"controller": LDVS} | FEW | wrong)
 
 
 def test_walks_that_cannot_be_disturbed_are_errors():

@@ -11,11 +11,13 @@ from hexmj.controllers.wrappers import LegLost, PoorSenses
 from hexmj.environments.learned import WithOffsets
 from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss
-from hexmj.studies.ablation import Ablation
+from hexmj.studies.ablation import Ablation, wholes
 from hexmj.studies.biology import Biology
 from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.studies.league import League
+from hexmj.studies.league_cells import entrants
 from hexmj.studies.stability_map import StabilityMap
+from hexmj.studies.static_limit import StaticLimit
 from hexmj.studies.terrain import Terrain
 
 
@@ -128,3 +130,38 @@ def test_a_load_without_trials_refuses_no_league() -> None:
     tried = replace(league, controllers={"ldvs": hexmj.LDVS})
     with pytest.raises(hexmj.InputError, match="grasp = 10"):
         tried.cells()
+
+
+@pytest.mark.parametrize(
+    ("name", "study", "wrong"),
+    [
+        ("controllers", League, {"controllers": {}}),
+        ("load", League, {"conditions": hexmj.Conditions(load=2.0)}),
+        ("ideal_start", entrants, {"names": ("ldvs-ideal",)}),
+        ("controllers", wholes, {"names": ("ldvs", "ldvs-without-3")}),
+        ("velocit", Ablation, {"velocities": (0.0, 0.5)}),
+        ("periods", Ablation, {"periods": 3}),
+        ("periods", Biology, {"periods": 3}),
+        ("vp", Biology, {"conditions": hexmj.Conditions(vp=38.0)}),
+        ("ground", Biology, {"conditions": hexmj.Conditions(ground="rough")}),
+        ("ground_height", Terrain, {"heights": (32.0,)}),
+        ("heights", Terrain, {"heights": (2.0, 2.0)}),
+        ("velocity", Terrain, {"velocities": (0.0,)}),
+        ("over", StabilityMap, {"over": "wind"}),
+        ("friction", StabilityMap, {"over": "friction", "values": [-1.0]}),
+        ("reads the legs", StabilityMap, {"controller": hexmj.SensoryFeedback(hexmj.LDVS)}),
+        ("leg_masses", StaticLimit, {"leg_masses": ()}),
+        ("vp", StaticLimit, {"conditions": hexmj.Conditions(vp=20.0)}),
+        ("disturbances", DisturbedWalks, {"disturbances": ["halt", "halt"]}),
+        ("disturbances", DisturbedWalks, {"disturbances": ["push"], "kinematic": True}),
+        ("strategies", DisturbedWalks, {"strategies": ["jump"]}),
+        ("impulses", DisturbedWalks, {"impulses": [-1.0]}),
+        ("velocities", DisturbedWalks, {"velocities": [0.05]}),
+        ("observation_time", DisturbedWalks, {"observation_time": 1.9}),
+        ("counts", DisturbedWalks, {"controller": Counts()}),
+    ],
+)
+def test_bad_input_is_refused(name: str, study: Any, wrong: dict[str, Any]) -> None:
+    one: Any = {"controllers": {"ldvs": hexmj.LDVS}} if study in (League, Ablation) else {"controller": hexmj.LDVS}
+    with pytest.raises(hexmj.InputError, match=name):
+        study(**({} if "names" in wrong else one) | wrong)

@@ -1,13 +1,8 @@
 """What is shown of results in a line, in a notebook and by help()."""
 
-import ast
-import inspect
 import re
 import xml.etree.ElementTree as Xml
-from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -79,48 +74,3 @@ def test_nothing_that_can_be_shown_is_no_error():
     empty = hexmj.Walk(np.zeros(0), np.zeros((0, 0)), tips, tips, tips.astype(bool))
     assert repr(empty) == "Walk(0 steps, 0 starts, V = unknown)"
     assert empty._repr_html_() is None
-
-
-def documented() -> Iterator[tuple[str, Any, str]]:
-    """Every exported name with its object and all docstrings of it: of its methods and fields, too."""
-    for name in dir(hexmj):
-        thing = getattr(hexmj, name)
-        if inspect.isclass(thing) or inspect.isfunction(thing):
-            tree = ast.parse(inspect.getsource(thing))
-            texts = [
-                one.value.value
-                for one in ast.walk(tree)
-                if isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant)
-            ]
-            yield name, thing, "\n".join(map(str, texts))
-
-
-def leads_somewhere(name: str, thing: Any) -> bool:
-    """Whether a name in a docstring is one of its module, of its class or of the package, or begins with a module's."""
-    parts = name.split(".")
-    wheres = [(one, parts) for one in (import_module(thing.__module__), thing, hexmj)]
-    for cut in range(1, len(parts)):
-        ends = f".{'.'.join(parts[:cut])}"
-        wheres += [(import_module(f"hexmj.{one}"), parts[cut:]) for one in MODULES if f".{one}".endswith(ends)]
-    return any(follow(where, path) for where, path in wheres)
-
-
-def follow(thing: Any, path: list[str]) -> bool:
-    """Whether attributes, or fields of a dataclass, lead from one to the next."""
-    for part in path:
-        known = hasattr(thing, part) or part in getattr(thing, "__annotations__", {})
-        thing = getattr(thing, part, None)
-        if not known:
-            return False
-    return True
-
-
-def test_names_in_docstrings_lead_somewhere():
-    """Those of classes and constants, and those with a dot, which nobody would take for an argument."""
-    lost = [
-        f"{name}: {cited}"
-        for name, thing, text in documented()
-        for cited in re.findall(r"(?<!`)`([A-Za-z_]\w*(?:\.\w+)*)`(?!`)", text)
-        if ("." in cited or cited[0].isupper()) and not leads_somewhere(cited, thing)
-    ]
-    assert lost == []

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj import LDVS, STICK_INSECT, Conditions, draw_starts, loss_time, physical_walk, walk_margin
 from hexmj.measures.physical import PhysicalWalk
-from hexmj.measures.support import GROUNDED, centre_of_pressure, grounded, pressure_margin
 from hexmj.physics.settle import settle
+from hexmj.studies.static_limit import GROUNDED, centre_of_pressure, grounded, pressure_margin
 
 
 @pytest.fixture(scope="module")

@@ -188,19 +188,3 @@ def test_the_ground_ends_where_its_pieces_do(ground, within, beyond):
     for places, ends in ((within, False), (beyond, True)):
         for x, y in places:
             assert beyond_the_ground(ahead, np.array([x, y, 0.0])) == ends, (x, y)
-
-
-@pytest.mark.parametrize(
-    ("name", "wrong"),
-    [
-        ("ground_height", {"heights": (32.0,)}),
-        ("heights", {"heights": (2.0, 2.0)}),
-        ("ground_length", {"grounds": ("gap",), "lengths": (0.0,)}),
-        ("grasp", {"grasps": (-1.0,)}),
-        ("velocity", {"velocities": (0.0,)}),
-        ("ground", {"conditions": Conditions(ground="step")}),
-    ],
-)
-def test_bad_input_is_refused(name, wrong):
-    with pytest.raises(InputError, match=name):
-        Terrain(LDVS, **{"n_starts": 2, "velocities": (0.6,)} | wrong)

@@ -97,8 +97,8 @@ def compare(
     n_starts: int = Comparison.n_starts,
     observation_time: str | float = Comparison.observation_time,
     seed: int = Comparison.seed,
-    conditions: Conditions | None = None,
-    stride: Stride | None = None,
+    conditions: Conditions = Comparison.conditions,
+    stride: Stride = Comparison.stride,
     acceleration: Acceleration | None = None,
     folder: Path | None = None,
     study: type[Comparison] = Comparison,
@@ -125,9 +125,9 @@ def compare(
         SimulationError: a walk does not settle, or diverges.
     """
     named = controllers if isinstance(controllers, Mapping) else {getattr(controllers, "name", "?"): controllers}
-    walks: Any = {"n_starts": n_starts, "seed": seed, "conditions": conditions or Conditions()}
-    walks |= {"velocities": np.atleast_1d(velocities).tolist(), "stride": stride or Stride()}
-    return run_study(study(named, observation_time=observation_time, acceleration=acceleration, **walks), folder, **how)
+    walks: Any = {"n_starts": n_starts, "seed": seed, "conditions": conditions, "stride": stride}
+    walks |= {"velocities": np.atleast_1d(velocities).tolist(), "observation_time": observation_time}
+    return run_study(study(named, acceleration=acceleration, **walks), folder, **how)
 
 
 def physical_flss(

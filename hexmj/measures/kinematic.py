@@ -39,7 +39,7 @@ def walk(
     velocity: ArrayLike,
     duration: float,
     *,
-    stride: Stride | None = None,
+    stride: Stride = STRIDE,
     acceleration: Acceleration | None = None,
     threads: int | None = None,
 ) -> PlannedWalk:
@@ -57,7 +57,6 @@ def walk(
     Raises:
         InputError: a start, velocity or duration is out of range.
     """
-    stride = stride or STRIDE
     plan = begin(controller, starts, velocity, stride, acceleration, threads)
     return advanced(plan, int(steps_within(number("duration", duration), stride)))
 
@@ -68,7 +67,7 @@ def first_loss(
     velocity: ArrayLike,
     duration: ArrayLike,
     *,
-    stride: Stride | None = None,
+    stride: Stride = STRIDE,
     acceleration: Acceleration | None = None,
     threads: int | None = None,
 ) -> np.ndarray:
@@ -76,7 +75,6 @@ def first_loss(
 
     Arguments are those of `walk`, and `duration` may be (start,). No walk is kept.
     """
-    stride = stride or STRIDE
     plan = begin(controller, starts, velocity, stride, acceleration, threads)
     steps, count = steps_within(duration, stride), len(plan.starts)
     if steps.shape not in ((), (count,)):
@@ -178,7 +176,7 @@ def flss(
     n_starts: int = KinematicFlss.n_starts,
     observation_time: str | float = KinematicFlss.observation_time,
     seed: int = KinematicFlss.seed,
-    stride: Stride | None = None,
+    stride: Stride = STRIDE,
     acceleration: Acceleration | None = None,
     range_of: int = RANGE,
     folder: Path | None = None,
@@ -202,7 +200,7 @@ def flss(
         InputError: an argument is out of range.
     """
     several: Any = np.atleast_1d(velocities).tolist()
-    walks = n_starts, observation_time, seed, stride or STRIDE, acceleration
+    walks = n_starts, observation_time, seed, stride, acceleration
     return run_study(KinematicFlss(controller, several, *walks, range_of), folder, **how)
 
 
@@ -214,7 +212,7 @@ def flss_over_range(
     n_starts: int = 7 * SAMPLE,
     observation_time: str | float = "walk",
     seed: int = 0,
-    stride: Stride | None = None,
+    stride: Stride = STRIDE,
     threads: int | None = None,
 ) -> tuple[float, tuple[float, float]]:
     """Return the kinematic FLSS over a range of velocities, J_N^t of Eq. 10: each start has a velocity of its own.
@@ -232,7 +230,6 @@ def flss_over_range(
     Raises:
         InputError: an argument is out of range.
     """
-    stride = stride or STRIDE
     if not 0 <= number("low", low) <= number("high", high) < 1:
         raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
     n_starts, seed = check_draw(n_starts, seed)

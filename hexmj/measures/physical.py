@@ -64,8 +64,8 @@ def physical_walk(
     velocity: ArrayLike,
     duration: float,
     *,
-    conditions: Conditions | None = None,
-    stride: Stride | None = None,
+    conditions: Conditions = Conditions(),
+    stride: Stride = Stride(),
     acceleration: Acceleration | None = None,
     threads: int | None = None,
     progress: Progress | bool | None = None,
@@ -86,7 +86,6 @@ def physical_walk(
     Raises:
         InputError, SimulationError: see `settle.settle` and `rollout.drive`.
     """
-    stride, conditions = stride or Stride(), conditions or Conditions()
     check_ground(conditions)
     kinematic = begin(controller, starts, velocity, stride, acceleration, threads)
     planned = advanced(kinematic, int(steps_within(duration, stride)))

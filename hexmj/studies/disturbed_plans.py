@@ -22,7 +22,7 @@ from hexmj.errors import InputError
 from hexmj.gaits import steady_state_gait
 from hexmj.stability import stability_margin, walk_margin
 from hexmj.starts import draw_starts
-from hexmj.timing import Acceleration, Stride
+from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, copied, joined
 
 Kind = Literal["halt", "leg", "push"]
@@ -151,14 +151,7 @@ class Disturbed:
         """Name of the controller, with a remark."""
         return f"{self.controller.name}, disturbed"
 
-    def begin(
-        self,
-        starts: np.ndarray,
-        velocity: np.ndarray,
-        stride: Stride,
-        acceleration: Acceleration | None = None,
-        threads: int | None = None,
-    ) -> "DisturbedPlan":
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> "DisturbedPlan":
         """Return a plan, see `protocol.Controller.begin`."""
         arguments = self.controller, starts, velocity, stride, acceleration, threads
         plan = cast(SteerablePlan, begin(*arguments, at_speed=True))

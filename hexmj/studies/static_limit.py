@@ -2,6 +2,10 @@
 
 The same starts walk at smaller and smaller V_p, with the insect's own legs and with legs of next to no mass, as the
 paper has them.
+
+The ground can carry a body with more than three standing feet in many ways. Which feet carry depends on how far the
+servos yield: a standing foot may hover by a fiftieth of the standing height while others carry. It supports the body
+nevertheless, since it carries as soon as the trunk sinks by as much.
 """
 
 from collections.abc import Sequence
@@ -18,10 +22,11 @@ from hexmj.measures.figures import caption
 from hexmj.measures.study import Study, kept_walk
 from hexmj.measures.tables import WalkSettings, over_start
 from hexmj.plotting import LEGEND, MEASURE_STYLES, frequency_curve, head, picture, tidy
-from hexmj.stability import loss_time, walk_margin
+from hexmj.stability import loss_time, stability_margin, walk_margin
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration
 from hexmj.validate import distinct
+from hexmj.walks import Walk
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,9 +34,13 @@ if TYPE_CHECKING:
 
     from hexmj.measures.physical import PhysicalWalk
 
+GROUNDED = 0.05
+"""Height below which a foot is at the ground, as a fraction of the standing height; 0.05 to 0.2 give the same FLSS at
+V_p = 20 mm/s within 0.04 (`docs/static_limit.md`)."""
+
 LOSSES = {"kinematic": "planned_loss", "measured": "measured_loss", "grounded": "grounded_loss", "physical": "fall"}
 """Measure of FLSS -> the outcome whose frequency it is: `compare.MEASURES`, and `grounded`, the measured one with all
-feet at the ground, see `measures.support`."""
+feet at the ground, see `grounded`."""
 
 DISTANCES = {
     "margin": ("mm", "mean distance between measured and planned stability margin"),
@@ -150,8 +159,6 @@ class StaticLimit(Study):
 
 def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Dataset":
     """Return the outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start: a cell of the study."""
-    from hexmj.measures.support import grounded
-
     walk = kept_walk(walks, walks.starts, threads)
     outcomes = vars(walk.outcomes) | {"grounded_loss": loss_time(grounded(walk), threads=threads)}
     units = dict.fromkeys(LOSSES.values(), "time unit") | REPORTED
@@ -166,8 +173,6 @@ def distances(walk: "PhysicalWalk") -> dict[str, np.ndarray]:
 
     If the controller reads the legs, the distance is that from the plan that it commands.
     """
-    from hexmj.measures.support import grounded, pressure_margin
-
     plan, measured, near = walk.ordered, walk.measured, grounded(walk)
     compared = plan.time[:, None] < np.minimum(loss_time(plan), walk.outcomes.fall)
     wanted, pressure = walk_margin(plan), pressure_margin(walk)
@@ -189,6 +194,35 @@ def distances(walk: "PhysicalWalk") -> dict[str, np.ndarray]:
             name: np.where(counts, values, 0.0).sum(axis=0) / counts.sum(axis=0)
             for name, (values, counts) in steps.items()
         }
+
+
+def grounded(walk: "PhysicalWalk", share: float = GROUNDED) -> Walk:
+    """Return the measured walk with the feet that hover by less than a share of the standing height standing too."""
+    near = walk.height <= share * walk.conditions.standing_height
+    return replace(walk.measured, stance=walk.measured.stance | near)
+
+
+def centre_of_pressure(walk: "PhysicalWalk") -> np.ndarray:
+    """Return the centre of the forces that push feet up, seen from the centre of mass, (step, start, 2) [mm].
+
+    A foot that adhesion holds down does not count. NaN where the ground pushes no foot up.
+    """
+    pushed = np.maximum(walk.load, 0.0)
+    with np.errstate(invalid="ignore"):
+        share = pushed / pushed.sum(axis=-1, keepdims=True)
+    return (share[..., None] * walk.measured.feet).sum(axis=-2)
+
+
+def pressure_margin(walk: "PhysicalWalk") -> np.ndarray:
+    """Return the distance of the centre of pressure from the nearest edge of the support polygon, (step, start) [mm].
+
+    The polygon is that of all feet at the ground. The centre of pressure never lies outside, and lies on the edge over
+    which the body tips. NaN where the ground pushes no foot up.
+    """
+    support, centre = grounded(walk), centre_of_pressure(walk)
+    known = np.isfinite(centre[..., 0])
+    feet = np.where(known[..., None, None], support.feet - centre[..., None, :], 0.0)
+    return np.where(known, np.abs(stability_margin(feet, support.stance & known[..., None])), np.nan)
 
 
 def static_limit_figure(result: "xr.Dataset") -> "Figure":
