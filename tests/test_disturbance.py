@@ -26,7 +26,7 @@ from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Sensed
 from hexmj.stability import stability_margin, walk_margin
-from hexmj.studies.disturbance import DisturbedWalks, every_case, with_flss_after
+from hexmj.studies.disturbance import DisturbedWalks, with_flss_after
 from hexmj.studies.disturbed_plans import (
     PAUSE,
     Disturbance,
@@ -355,7 +355,8 @@ def test_any_weights_can_be_disturbed():
 
 
 def test_without_physics_pushes_and_grasping_are_left_out():
-    cases = every_case(["halt", "push"], [1.0], ["reorganise", "grasp"], physical=False)
+    few: Any = {"disturbances": ["halt", "push"], "strategies": ["reorganise", "grasp"], "kinematic": True}
+    cases = DisturbedWalks(LDVS, **FEW, **few).cases
     assert [(case.disturbance, case.strategy) for case in cases] == [
         ("undisturbed", "none"), ("halt", "none"), ("halt", "reorganise"),
     ]  # fmt: skip

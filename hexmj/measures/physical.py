@@ -120,18 +120,9 @@ def physical_walk_of_plan(
             same = part_of(planned, slice(first, first + len(chunk.plan.time)))
             check_same(same, chunk.plan, "two plans of the controller", first)
     outcomes = so_far.outcomes()
-    return PhysicalWalk(
-        planned=planned,
-        ordered=_until_fall(outcomes.fall, planned, followed, stride) if followed else planned,
-        measured=so_far.measured,
-        outcomes=outcomes,
-        qpos=so_far.qpos,
-        centre_of_mass=so_far.centre_of_mass,
-        height=so_far.height,
-        load=so_far.load,
-        conditions=settled.conditions,
-        stride=stride,
-    )
+    ordered = _until_fall(outcomes.fall, planned, followed, stride) if followed else planned
+    kept = {name: getattr(so_far, name) for name in ("measured", "qpos", "centre_of_mass", "height", "load")}
+    return PhysicalWalk(planned, ordered, outcomes=outcomes, conditions=settled.conditions, stride=stride, **kept)
 
 
 def physical_outcomes(

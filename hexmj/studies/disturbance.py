@@ -21,6 +21,7 @@ from hexmj.plotting import LEGEND, SERIES, flss_axes, frequency_curve, head, pic
 from hexmj.studies.disturbed_walks import GRID, NO_DISTURBANCE, Answer, Case, Kind, StableWalks, Strategy
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration, check_reached, steps_within
+from hexmj.validate import choice, distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,7 +91,13 @@ class DisturbedWalks(Study):
 
             if not can_push(self.conditions, self.stride, time.min()):
                 raise InputError(f"observation_time = {self.observation_time!r}; a push lasts longer")
-        _ = self.grasping, self.cases, [self._walks(velocity) for velocity in v]
+        for name, valid in {"disturbances": get_args(Kind), "strategies": get_args(Answer)}.items():
+            values = [choice(name, value, valid) for value in getattr(self, name)]
+            distinct(name, ["none", *values])
+        if not all(0 < impulse <= MOST_IMPULSE for impulse in self.impulses):
+            raise InputError(f"impulses = {self.impulses}; expected above 0 and up to {MOST_IMPULSE:g} times m V_p")
+        distinct("disturbances", [case for case in self.cases if case.disturbance != NO_DISTURBANCE])
+        _ = self.grasping, [self._walks(velocity) for velocity in v]
 
     @property
     def grasping(self) -> Conditions:
@@ -104,8 +111,19 @@ class DisturbedWalks(Study):
 
     @property
     def cases(self) -> list[Case]:
-        """The undisturbed walk, then every disturbance without a strategy and with each."""
-        return every_case(self.disturbances, self.impulses, self.strategies, not self.kinematic)
+        """The undisturbed walk, then every disturbance without a strategy and with each.
+
+        In kinematic walks, pushes and the strategy 'grasp' are left out.
+        """
+        left_out = PHYSICAL if self.kinematic else ()
+        kinds: list[Kind] = [kind for kind in self.disturbances if kind not in left_out]
+        answers: list[Strategy] = ["none", *(answer for answer in self.strategies if answer not in left_out)]
+        return [Case("push", "none")] + [
+            Case(kind, answer, float(impulse))
+            for kind in kinds
+            for impulse in (self.impulses if kind == "push" else (0.0,))
+            for answer in answers
+        ]
 
     def cells(self) -> list[Cell]:
         """Return a cell for each velocity and case."""
@@ -145,35 +163,6 @@ class DisturbedWalks(Study):
         drawn = table.drawn.isel(case=0).assign_attrs(units="1", long_name="starts drawn to find these")
         own = {"recovery": asdict(self.back), "adhesion": self.adhesion, "physical": not self.kinematic}
         return self.labelled(with_flss_after(table.assign(drawn=drawn)), "disturb", grid=GRID, **own)
-
-
-def every_case(
-    disturbances: Sequence[Kind], impulses: Sequence[float], strategies: Sequence[Answer], physical: bool
-) -> list[Case]:
-    """Return the undisturbed walk, then every disturbance without a strategy and with each.
-
-    Without physics, pushes and the strategy 'grasp' are left out.
-
-    Raises:
-        InputError: a name or an impulse is not allowed, or no disturbance is left.
-    """
-    chosen = {"disturbances": (disturbances, get_args(Kind)), "strategies": (strategies, get_args(Answer))}
-    for name, (values, valid) in chosen.items():
-        if len({*values}) < len(values) or not {*values} <= {*valid}:
-            raise InputError(f"{name} = {list(values)}; expected distinct values of {', '.join(valid)}")
-    if len({*impulses}) < len(impulses) or not all(0 < impulse <= MOST_IMPULSE for impulse in impulses):
-        raise InputError(f"impulses = {list(impulses)}; expected distinct values up to {MOST_IMPULSE:g} times m V_p")
-    left_out = () if physical else PHYSICAL
-    kinds: list[Kind] = [kind for kind in disturbances if kind not in left_out]
-    answers: list[Strategy] = ["none", *(answer for answer in strategies if answer not in left_out)]
-    if not kinds or ("push" in kinds and not impulses):
-        raise InputError(f"disturbances = {kinds}; expected at least one, and impulses for pushes")
-    return [Case("push", "none")] + [
-        Case(kind, answer, float(impulse))
-        for kind in kinds
-        for impulse in (impulses if kind == "push" else (0.0,))
-        for answer in answers
-    ]
 
 
 def with_flss_after(data: "xr.Dataset") -> "xr.Dataset":

@@ -174,7 +174,13 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
     """
     stands = standing_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
     blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
-    parts = [part for block in blocks for part in by_halves(block, lambda which: _fates(walks, which, threads))]
+
+    def fate(which: np.ndarray) -> dict[str, np.ndarray]:
+        walk = kept_walk(walks, walks.starts[which], threads)
+        static = {"static_loss": loss_time(static_plan(walk), threads=threads)}
+        return vars(walk.outcomes) | static | {"mechanism": mechanisms(walk), "direction": fall_direction(walk)}
+
+    parts = [part for block in blocks for part in by_halves(block, fate)]
     if not parts:
         value = walks.conditions.values()[over]
         raise InputError(f"{over} = {value:g}; no start stands and reaches its tips at V = {walks.velocity:g}")
@@ -183,12 +189,6 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
     return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(
         start=("start", within, {"units": "1"})
     )
-
-
-def _fates(walks: WalkSettings, which: np.ndarray, threads: int | None) -> dict[str, np.ndarray]:
-    walk = kept_walk(walks, walks.starts[which], threads)
-    static = {"static_loss": loss_time(static_plan(walk), threads=threads)}
-    return vars(walk.outcomes) | static | {"mechanism": mechanisms(walk), "direction": fall_direction(walk)}
 
 
 def with_differences(data: "xr.Dataset", reference: float) -> "xr.Dataset":
