@@ -4,6 +4,7 @@ A leg's movement is timed by its onsets, when it is raised and protraction begin
 threshold: the onset, `TOLERANCE` and `CYCLES` are our conventions.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,9 +87,11 @@ def gait(walk: Walk) -> Gait:
         raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
     if not walk.stance.shape[1]:
         raise InputError("a walk of 0 starts; expected at least 1")
-    found = _gaits(*_changes(walk.stance), walk.time, walk.stance.shape[1])
-    longest = int(_steps(found["looked_at"], walk.time).max())
-    return _with_stability(found, walk_margin(part_of(walk, slice(-longest, None))) > 0, walk.time)
+
+    def upright(steps: int) -> np.ndarray:
+        return walk_margin(part_of(walk, slice(-steps, None))) > 0
+
+    return _gaits(*_changes(walk.stance), walk.time, walk.stance.shape[1], upright)
 
 
 def steady_state_gait(
@@ -136,7 +139,7 @@ def steady_state_gait(
             upright.append(walk_margin(part) > 0)
     time = np.arange(steps + 1) * stride.dt
     row, foot, down = (np.concatenate(column) for column in zip(*changes, strict=True))
-    return _with_stability(_gaits(row, foot, down, time, n_starts), np.concatenate(upright), time)
+    return _gaits(row, foot, down, time, n_starts, lambda steps: np.concatenate(upright))
 
 
 def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -147,42 +150,52 @@ def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _gaits(
-    row: np.ndarray, foot: np.ndarray, down: np.ndarray, time: np.ndarray, n_starts: int
-) -> dict[str, np.ndarray]:
-    """Return the fields of `Gait`, with `looked_at` instead of `stable`: the time at the end of the walk in which
-    stability is evaluated [time units], (start,)."""
+    row: np.ndarray,
+    foot: np.ndarray,
+    down: np.ndarray,
+    time: np.ndarray,
+    n_starts: int,
+    upright: Callable[[int], np.ndarray],
+) -> Gait:
+    """Return the gaits of all starts.
+
+    Args:
+        row, foot, down: changes of state, see `_changes`.
+        time: of the walk, (step,) [time units].
+        n_starts: number of starts.
+        upright: returns whether so many of the last steps are statically stable, or more of them, (step, start).
+    """
+    dt = float((time[-1] - time[0]) / (len(time) - 1))
     raised = _by_foot(row[~down], foot[~down], 6 * n_starts)
     lowered = _by_foot(row[down], foot[down], 6 * n_starts)
     periods, duty_factor = np.full((n_starts, 6), np.nan), np.full((n_starts, 6), np.nan)
     phase, reached = np.full((n_starts, len(PAIRS)), np.nan), np.full(n_starts, np.inf)
-    looked_at = np.full(n_starts, np.inf)
+    looked_at = np.full(n_starts, np.inf)  # time at the end of the walk in which stability is evaluated
     j, k = np.transpose(list(PAIRS.values()))
     for n in range(n_starts):
         legs = slice(6 * n, 6 * n + 6)
         begin, touch, end = time[_cycles(raised[legs], lowered[legs])]
         if len(begin):
             looked_at[n] = CYCLES * (end - begin)[-1].max()
-        settled = _settled(begin, end, _resolution(time))
-        if len(begin) - settled < CYCLES or _has_ended(end, raised[legs], time):
+        settled = _settled(begin, end, dt)
+        if len(begin) - settled < CYCLES:
             continue
+        due = time[[rows[-1] for rows in raised[legs]]] + (1.0 + TOLERANCE) * (end[-1, 0] - end[-2, 0]) + STEPS * dt
+        if (due < time[-1]).any():
+            continue  # a leg is not raised again
         begin, touch, end = begin[settled:], touch[settled:], end[settled:]
         span = end[-1] - begin[0]
         periods[n] = span / np.round(span / (end[-1] - begin[-1]))  # legs raised with leg 1 may skip or repeat a cycle
         swing = touch - begin
-        settled = _like_the_last(np.abs(swing - swing[-1]) / periods[n], _resolution(time) / periods[n].mean())
+        settled = _like_the_last(np.abs(swing - swing[-1]) / periods[n], dt / periods[n].mean())
         duty_factor[n] = 1.0 - swing[settled:].mean(axis=0) / periods[n]
         phase[n] = circular_mean((begin[:, k] - begin[:, j]) / periods[n].mean(), axis=0)  # Phi_{j-k}
         reached[n] = begin[0, 0]
         looked_at[n] = periods[n].mean()
-    return {
-        "period": periods.mean(axis=1),
-        "periods": periods,
-        "duty_factor": duty_factor,
-        "phase": phase,
-        "reached": reached,
-        "periodic": np.isfinite(reached),
-        "looked_at": looked_at,
-    }
+    steps = np.ceil(np.clip(looked_at / dt, 1, len(time))).astype(int)
+    kept = upright(int(steps.max()))
+    stable = np.array([bool(kept[-last:, start].all()) for start, last in enumerate(steps)])
+    return Gait(periods.mean(axis=1), periods, duty_factor, phase, reached, np.isfinite(reached), stable)
 
 
 def _by_foot(row: np.ndarray, foot: np.ndarray, feet: int) -> list[np.ndarray]:
@@ -215,32 +228,8 @@ def _settled(begin: np.ndarray, end: np.ndarray, resolution: float) -> int:
     return _like_the_last(change, resolution / period)
 
 
-def _has_ended(end: np.ndarray, raised: list[np.ndarray], time: np.ndarray) -> bool:
-    """Whether a leg that is due is not raised again, by the ends of its cycles, (cycle, leg) [time units], and the rows
-    of its onsets."""
-    last = time[[rows[-1] for rows in raised]]
-    due = last + (1.0 + TOLERANCE) * (end[-1, 0] - end[-2, 0]) + STEPS * _resolution(time)
-    return bool((due < time[-1]).any())
-
-
 def _like_the_last(change: np.ndarray, resolution: float) -> int:
     """Return the first cycle from which all equal the last, by their differences from it, (cycle, leg), and the time
     step, both in periods."""
     unlike = np.flatnonzero(change.max(axis=1) > TOLERANCE + STEPS * resolution)
     return int(unlike[-1]) + 1 if len(unlike) else 0
-
-
-def _steps(duration: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Return the steps of each duration, rounded up and within the walk."""
-    return np.ceil(np.clip(duration / _resolution(time), 1, len(time))).astype(int)
-
-
-def _resolution(time: np.ndarray) -> float:
-    """Return the time step of a walk [time units]."""
-    return float((time[-1] - time[0]) / (len(time) - 1))
-
-
-def _with_stability(found: dict[str, np.ndarray], upright: np.ndarray, time: np.ndarray) -> Gait:
-    """Return the gaits; each is stable if all its last steps are upright, (step, start)."""
-    ends = enumerate(_steps(found.pop("looked_at"), time))
-    return Gait(**found, stable=np.array([bool(upright[-steps:, start].all()) for start, steps in ends]))

@@ -52,8 +52,8 @@ def caption(result: "xr.Dataset", least: int | None = None) -> str:
         words.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
     usual = json.loads(json.dumps(asdict(Stride())))
     changed = {name: value for name, value in (made.get("stride") or {}).items() if value != usual.get(name, value)}
-    lines = ["other lines of the tips"] if changed.pop("geometry", None) else []
-    words.append(", ".join([*(_term(name, value) for name, value in changed.items()), *lines]))
+    words.append("other lines of the tips" if changed.pop("geometry", None) else "")
+    words.append(", ".join(_term(name, value) for name, value in changed.items()))
     if made.get("physical", True):
         given = made.get("conditions") or {}
         shown = {"vp", *unusual(given)}
@@ -78,11 +78,12 @@ def network_rules(controller: Any) -> str:
         return ""
     from hexmj.controllers.cruse1998 import ModelVariant, variant_name
 
-    variant = ModelVariant(**controller["model_variant"])
-    order = f"{controller['order']} order" if controller["order"] != "printed" else ""
-    return ", ".join(
-        filter(None, [order, f"model variant {variant_name(variant)}" if variant != ModelVariant() else ""])
-    )
+    variant, words = ModelVariant(**controller["model_variant"]), []
+    if controller["order"] != "printed":
+        words.append(f"{controller['order']} order")
+    if variant != ModelVariant():
+        words.append(f"model variant {variant_name(variant)}")
+    return ", ".join(words)
 
 
 def comparison_figure(result: "xr.Dataset") -> "Figure":

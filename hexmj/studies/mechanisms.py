@@ -47,18 +47,16 @@ SAVED = ("still_standing", "too_short", "landed_in_time", "caught")
 _NUMBER = {name: number for number, name in enumerate(MECHANISMS)}
 
 
-def mechanisms(walk: "PhysicalWalk", tipped: float = TIPPED) -> np.ndarray:
+def mechanisms(walk: "PhysicalWalk") -> np.ndarray:
     """Return the mechanism of each start as an index in `MECHANISMS`, (start,).
 
-    Args:
-        walk: physical walks kept whole; a loss that the end of the observation time cuts short counts as survived.
-        tipped: as `TIPPED` [rad].
+    A loss that the end of the observation time cuts short counts as survived.
     """
     fell, known = np.isfinite(walk.outcomes.fall), np.isfinite(walk.qpos[..., 0]).sum(axis=0)
     kept, outside = walk_margin(static_plan(walk)), walk_margin(walk.measured) <= 0.0
     leans, tilt = lean(walk.qpos[..., 3:7])
     steps = _time_constant(walk)
-    upright = _long_upright(tilt < tipped, steps)
+    upright = _long_upright(tilt < TIPPED, steps)
     caught = _caught(walk)
     narrow = NARROW * walk.conditions.standing_height
     names = np.full(len(fell), _NUMBER["never_lost"])
@@ -69,11 +67,11 @@ def mechanisms(walk: "PhysicalWalk", tipped: float = TIPPED) -> np.ndarray:
             tips = min(int(np.flatnonzero(np.append(True, upright[rows]))[-1]), end - 1)
             least = kept[max(tips - steps, 0) : tips + 1, start].min()
             since = slice(max(tips - 2 * steps, 0), end), start
-            names[start] = _fall(leans[since][tilt[since] >= tipped], leans[end - 1, start], least, narrow)
+            names[start] = _fall(leans[since][tilt[since] >= TIPPED], leans[end - 1, start], least, narrow)
             continue
         for begin, over in _losses(kept[rows] <= 0.0, (upright & ~outside)[rows]):
             exposed = tilt[begin:over, start][outside[begin:over, start]]
-            names[start] = max(names[start], _rescue(exposed, caught[begin:over, start], tipped))
+            names[start] = max(names[start], _rescue(exposed, caught[begin:over, start]))
     return names
 
 
@@ -99,13 +97,13 @@ def _fall(tipping: np.ndarray, last: np.ndarray, least: float, narrow: float) ->
     return _NUMBER["tipped_ahead" if last[0] > 0.0 else "tipped_behind"]
 
 
-def _rescue(exposed: np.ndarray, caught: np.ndarray, tipped: float) -> int:
+def _rescue(exposed: np.ndarray, caught: np.ndarray) -> int:
     """Return the mechanism of a survived loss, from the tilt while the centre of mass was outside, (step,)."""
     if caught.any():
         return _NUMBER["caught"]
     if not exposed.size:
         return _NUMBER["still_standing"]
-    return _NUMBER["landed_in_time" if exposed.max() >= tipped else "too_short"]
+    return _NUMBER["landed_in_time" if exposed.max() >= TIPPED else "too_short"]
 
 
 def _losses(lost: np.ndarray, recovered: np.ndarray) -> Iterator[tuple[int, int]]:
