@@ -14,7 +14,7 @@ from compiled_bodies import at_home, changed_body, conditions, differences
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.ground import depth_in_ground, ground_level
 from hexmj.bodies.kinematics import ThreeHinges
-from hexmj.bodies.mjcf import compile_body, gains, longest_lever, plain_model
+from hexmj.bodies.mjcf import compile_body, gains, plain_model
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Servo
 from hexmj.errors import InputError
 from hexmj.legs import FIG1
@@ -36,7 +36,8 @@ def test_gains_are_computed_from_mass_lengths_and_time_step():
     model = plain_model(STICK_INSECT)
     found = gains(model, STICK_INSECT)
     assert found == (4e5, 1.5e6)
-    assert longest_lever(model, STICK_INSECT) == pytest.approx(18.26 + 22.385)  # a front leg's femur and tibia
+    lever = 18.26 + 22.385  # a front leg's femur and tibia
+    assert gains(model, replace(STICK_INSECT, servo=Servo(digits=15)))[0] == pytest.approx(9810.0 * lever)
     knees = model.dof_M0[model.joint("R3_femur_tibia").dofadr[0]], model.dof_M0[model.joint("L3_femur_tibia").dofadr[0]]
     assert_allclose(knees, 1.6, atol=0.05)
 

@@ -25,7 +25,7 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody, add_sensors
 from hexmj.bodies.ground import lay_ground
 from hexmj.bodies.kinematics import joint_numbers, posed
-from hexmj.bodies.validation import check_described, check_finished
+from hexmj.bodies.validation import check
 from hexmj.body import Body
 from hexmj.conditions import ROUNDING, Conditions
 from hexmj.errors import InputError
@@ -80,21 +80,15 @@ def gains(model: mujoco.MjModel, body: Body) -> tuple[float, float]:
     Returns:
         Torque limit [g mm^2/s^2], and stiffness, torque per angle off the target [g mm^2/s^2/rad].
     """
-    servo, weight = body.servo, -body.mass * float(model.opt.gravity[2])
-    lightest = model.dof_M0[model.jnt_dofadr[joint_numbers(model, body)]].min(axis=1)  # inertia, (leg,)
-    torque, stiffness = weight * longest_lever(model, body), 1.0 / (servo.step**2 * (1.0 / lightest).mean())
-    return float(f"{torque:.{servo.digits - 1}e}"), float(f"{stiffness:.{servo.digits - 1}e}")
-
-
-def longest_lever(model: mujoco.MjModel, body: Body) -> float:
-    """The longest lever with which the weight, on one foot, can turn a joint [mm]."""
-    data, joints = posed(model, model.key(body.home).qpos), joint_numbers(model, body)
+    data, joints, servo = posed(model, model.key(body.home).qpos), joint_numbers(model, body), body.servo
     feet = data.site_xpos[[model.site(foot).id for foot in body.feet]]
     places = np.concatenate([data.xanchor[joints], feet[:, None]], axis=1)  # (leg, joint + 1, axis)
     segments = np.linalg.norm(np.diff(places, axis=1), axis=-1)
     length = np.cumsum(segments[:, ::-1], axis=1)[:, ::-1]
-    horizontal = np.linalg.norm(data.xaxis[joints][..., :2], axis=-1)
-    return float((length * horizontal).max())
+    lever = (length * np.linalg.norm(data.xaxis[joints][..., :2], axis=-1)).max()
+    lightest = model.dof_M0[model.jnt_dofadr[joints]].min(axis=1)  # inertia, (leg,)
+    torque, stiffness = body.mass * -model.opt.gravity[2] * lever, 1.0 / (servo.step**2 * (1.0 / lightest).mean())
+    return float(f"{torque:.{servo.digits - 1}e}"), float(f"{stiffness:.{servo.digits - 1}e}")
 
 
 def check_home(compiled: CompiledBody) -> None:
@@ -131,7 +125,7 @@ def _plain_model(body: Body, mjcf: bytes) -> mujoco.MjModel:
         model = mujoco.MjModel.from_xml_path(str(body.mjcf))
     except ValueError as error:
         raise InputError(f"body {body.name!r}: {body.mjcf} does not compile: {' '.join(str(error).split())}") from None
-    check_described(model, body)
+    check(model, body)
     return model
 
 
@@ -162,7 +156,7 @@ def _compiled(conditions: Conditions, looks: bool, pushes: bool, mjcf: bytes) ->
     feet = [model.site(foot).id for foot in body.feet]
     model.site_type[feet], radius = mujoco.mjtGeom.mjGEOM_SPHERE, model.geom(body.feet[0]).size[0]
     model.site_size[feet, 0] = radius + radius / 10  # a touch sensor sees only contacts within its site
-    check_finished(model, body)
+    check(model, body, finished=True)
     if conditions.leg_mass != 1.0 or conditions.centre_of_mass != 0.0:
         _redistribute(model, conditions)
     return CompiledBody.of(model, conditions)

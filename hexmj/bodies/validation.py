@@ -57,28 +57,15 @@ HARMLESS = ("equality", "filterparent", "midphase", "nativeccd", "multiccd", "is
 """Flags that have no effect on the walk."""
 
 
-def check_described(model: mujoco.MjModel, body: Body) -> None:
-    """Check that an MJCF, compiled as it is, fits its description.
+def check(model: mujoco.MjModel, body: Body, *, finished: bool = False) -> None:
+    """Check an MJCF, compiled as it is, or the finished model that walks.
 
     Raises:
-        InputError: the first difference.
+        InputError: the MJCF does not fit its description, or the finished model has forces that hexmj ignores.
     """
-    for faults in (_names, _joints, _sizes, _legs, _ground_and_pairs):
-        _refuse(faults(model, body), body)
-
-
-def check_finished(model: mujoco.MjModel, body: Body) -> None:
-    """Check that the model that walks has no forces, joints or options that hexmj ignores.
-
-    Raises:
-        InputError: the first of them.
-    """
-    _refuse(_finished(model, body), body)
-
-
-def _refuse(faults: Iterator[str], body: Body) -> None:
-    for fault in faults:
-        raise InputError(f"body {body.name!r}: {fault}")
+    for faults in (_finished,) if finished else (_names, _joints, _sizes, _legs, _ground_and_pairs):
+        for fault in faults(model, body):
+            raise InputError(f"body {body.name!r}: {fault}")
 
 
 def _names(model: mujoco.MjModel, body: Body) -> Iterator[str]:

@@ -216,10 +216,9 @@ class View(Command):
         if desktop:
             from hexmj.replay.take import Take
             from hexmj.view.desktop import PAUSE, view_recording
-            from hexmj.view.session import ReplaySession
 
             show(PAUSE, END)
-            view_recording(ReplaySession(Take.of(recording)))
+            view_recording(Take.of(recording))
         else:
             from hexmj.replay.page import page_text
             from hexmj.view.browser import page_server

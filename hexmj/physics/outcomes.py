@@ -17,9 +17,6 @@ from hexmj.walks import PlannedWalk, Walk
 NUMBERS = ("clearance", "tilt", "slip", "depth", "saturation")
 """Outcomes that every walk has; speed is NaN at V = 0, tracking if no target is on the ground."""
 
-HAPPENED = {"planned loss": "planned_loss", "measured loss": "measured_loss", "fell": "fall", "toppled": "topple"}
-"""Event -> the field of `Outcomes` with its time."""
-
 TOPPLED = 0.1
 """Tilt of the trunk beyond which it has toppled, in any direction [rad]."""
 
@@ -63,7 +60,9 @@ class Outcomes:
     """(start,) targets out of reach; such a leg keeps its last angles."""
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{name} {int(np.isfinite(getattr(self, time)).sum())}" for name, time in HAPPENED.items())
+        times = {"planned loss": self.planned_loss, "measured loss": self.measured_loss, "fell": self.fall}
+        times["toppled"] = self.topple
+        counts = ", ".join(f"{name} {np.isfinite(time).sum()}" for name, time in times.items())
         least = f"; least clearance {self.clearance.min():.3g} mm" if len(self.fall) else ""
         return f"Outcomes(of {len(self.fall)}: {counts}{least})"
 

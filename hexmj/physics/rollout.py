@@ -128,18 +128,22 @@ def _planned(rollout: "Rollout", orders: OrdersFromPlan) -> Iterator[Chunk]:
 
 def _with_feedback(rollout: "Rollout", plan: FeedbackPlan, orders: OrdersFromPlan) -> Iterator[Chunk]:
     """Follow a plan that senses the bodies before each of its steps."""
-
-    def step_by_step(steps: int) -> Iterator[Orders]:
-        for _ in range(steps):
-            plan.sense(rollout.sensed(ids))
-            if now := orders.ahead(ids, steps=1):
-                yield now
-
     ids = np.arange(len(rollout.settled.starts))
     while len(ids) and (steps := orders.steps_ahead()):
-        chunk = rollout.carry_out(step_by_step(steps))
+        chunk = rollout.carry_out(next_orders(rollout, plan, orders, ids, steps))
         yield chunk
         ids = ids[~chunk.fell]
+
+
+def next_orders(
+    rollout: "Rollout", plan: Plan, orders: OrdersFromPlan, ids: np.ndarray, steps: int
+) -> Iterator[Orders]:
+    """Orders of some starts, (n,), for the next steps of a plan, one by one if it has feedback."""
+    for part in [1] * steps if isinstance(plan, FeedbackPlan) else [steps]:
+        if isinstance(plan, FeedbackPlan):
+            plan.sense(rollout.sensed(ids))
+        if now := orders.ahead(ids, part):
+            yield now
 
 
 class Rollout:

@@ -17,8 +17,8 @@ from hexmj.bodies.mjcf import compile_body
 from hexmj.conditions import Conditions
 from hexmj.errors import RenderingError
 from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
-from hexmj.replay.take import margin_in_words, support_on_ground
-from hexmj.view.session import IMPULSE, LiveSession, ReplaySession, ticks
+from hexmj.replay.take import Take, margin_in_words, support_on_ground
+from hexmj.view.session import IMPULSE, LYING_TIME, LiveSession, ticks
 
 PAUSE = "space pauses"
 KEYS = f"{PAUSE}, up and down change V, left and right push, enter takes the next start"
@@ -44,15 +44,18 @@ def view_live(session: LiveSession) -> None:
         _show(window, walk.conditions, moment.qpos, moment.margin, seen, text, session.message)
 
 
-def view_recording(session: ReplaySession) -> None:
-    """Show a recording until the window is closed."""
-    take = session.take
+def view_recording(take: Take) -> None:
+    """Show a recording again and again at half speed until the window is closed."""
+    seconds, paused = 0.0, False
 
     def pause(key: int) -> None:
-        session.paused ^= key == SPACE
+        nonlocal paused
+        paused ^= key == SPACE
 
     for window, passed in _opened(take.conditions, pause):
-        row = session.tick(passed)
+        if not paused:
+            seconds = (seconds + passed / 2) % (take.end - take.begin + LYING_TIME)
+        row = take.row(take.begin + seconds)
         seen = take.feet[row], take.stance[row], take.centre_of_mass[row], take.planned_tip[row]
         text = f"{take.title}, half speed, {margin_in_words(take.margin[row])}"
         _show(window, take.conditions, take.qpos[row], take.margin[row], seen, text)
@@ -102,11 +105,8 @@ def _window(conditions: Conditions, on_key: Callable[[int], None]) -> Any:
     except RuntimeError as error:  # also on macOS, where only mjpython can open it
         raise RenderingError(f"No window can be opened: {error}. Use --browser.") from None
     window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, compiled.root
-    window.cam.distance, window.cam.azimuth, window.cam.elevation = (
-        5 * conditions.body.lengths.shortest_leg,
-        60.0,
-        -25.0,
-    )
+    window.cam.distance, window.cam.azimuth = 5 * conditions.body.lengths.shortest_leg, 60.0
+    window.cam.elevation = -25.0
     return window
 
 

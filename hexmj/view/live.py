@@ -9,12 +9,12 @@ import numpy as np
 from hexmj.body import ROOT_QPOS
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import begin
-from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, SteerableController, SteerablePlan
+from hexmj.controllers.protocol import Controller, Plan, SteerableController, SteerablePlan
 from hexmj.errors import InputError
-from hexmj.physics.foot_path import Orders, OrdersFromPlan, steps_in_chunk
+from hexmj.physics.foot_path import OrdersFromPlan, steps_in_chunk
 from hexmj.physics.outcomes import measured_walk
 from hexmj.physics.pushes import Push, steps_pushed
-from hexmj.physics.rollout import Chunk, Rollout
+from hexmj.physics.rollout import Chunk, Rollout, next_orders
 from hexmj.physics.settle import settle
 from hexmj.rotations import rotated
 from hexmj.stability import walk_margin
@@ -61,26 +61,12 @@ class SteeredPlan:
     def __init__(self, controller: Controller, starts: np.ndarray, velocity: float, stride: Stride) -> None:
         """Begin at `starts`, (1, leg) [mm]."""
         self.starts, self.stride, self.done = starts, stride, 0
-        self._plan: Plan = begin(controller, starts, velocity, stride, threads=1)
-
-    @property
-    def has_feedback(self) -> bool:
-        """Whether the plan receives the state of the legs before each step."""
-        return isinstance(self._plan, FeedbackPlan)
-
-    @property
-    def made_for(self) -> object:
-        """The conditions of the plan, if it depends on them; see `protocol.Plan`."""
-        return getattr(self._plan, "made_for", None)
-
-    def sense(self, sensed: Sensed) -> None:
-        """Pass the state of the legs to the plan."""
-        if isinstance(self._plan, FeedbackPlan):
-            self._plan.sense(sensed)
+        self.current: Plan = begin(controller, starts, velocity, stride, threads=1)
+        self.made_for = getattr(self.current, "made_for", None)
 
     def advance(self, steps: int) -> PlannedWalk:
         """Return the next steps."""
-        walk = self._plan.advance(steps)  # the physics checks it
+        walk = self.current.advance(steps)  # the physics checks it
         self.done += steps
         return replace(walk, time=np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt)
 
@@ -90,11 +76,11 @@ class SteeredPlan:
         Returns:
             Whether both the last plan and the controller can be steered; otherwise nothing has changed.
         """
-        if not (isinstance(controller, SteerableController) and isinstance(self._plan, SteerablePlan)):
+        if not (isinstance(controller, SteerableController) and isinstance(self.current, SteerablePlan)):
             return False
         plan = cast(SteerablePlan, begin(controller, self.starts, velocity, self.stride, at_speed=True))
-        plan.see(self._plan.tips.copy(), self._plan.standing.copy())
-        self._plan = plan
+        plan.see(self.current.tips.copy(), self.current.standing.copy())
+        self.current = plan
         return True
 
 
@@ -220,22 +206,13 @@ class LiveWalk:
         return self.moment
 
     def _walk(self, steps: int) -> None:
-        chunk = self._rollout.carry_out(self._ordered(steps))
+        chunk = self._rollout.carry_out(next_orders(self._rollout, self._plan.current, self._orders, ONLY, steps))
         if chunk.fell.any():
             trunk = chunk.sensors[0, chunk.valid[0] - 1, self.settled.compiled.columns.trunk]
             self.fell_on = self.conditions.body.trunk[int(np.argmax(trunk > 0))]
         self.trace += self._moments(chunk)
         if self.trace:
             self.moment = self.trace[-1]
-
-    def _ordered(self, steps: int) -> Iterator[Orders]:
-        """Orders for the next steps, one by one if the plan has feedback."""
-        for part in [1] * steps if self._plan.has_feedback else [steps]:
-            if self._plan.has_feedback:
-                self._plan.sense(self._rollout.sensed(ONLY))
-            orders = self._orders.ahead(ONLY, part)
-            assert orders, "`advance` limits the length of the walk"
-            yield orders
 
     def _moments(self, chunk: Chunk) -> Iterator[Moment]:
         """States of a chunk: the insect and its plan as each step but the first begins, until the insect falls."""

@@ -1,11 +1,10 @@
-"""A live walk or a recording in real time, for every viewer."""
+"""A live walk in real time, for every viewer."""
 
 import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from hexmj.replay.take import Take
 from hexmj.view.live import LiveWalk, Moment
 
 FRAME_RATE = 30.0
@@ -85,17 +84,3 @@ class LiveSession:
             self.message = str(error)
             return False
         return True
-
-
-class ReplaySession:
-    """A recording that repeats at half speed."""
-
-    def __init__(self, take: Take) -> None:
-        """Begin with the first step."""
-        self.take, self._seconds, self.paused = take, 0.0, False
-
-    def tick(self, passed: float) -> int:
-        """Advance by a time [s] and return the current step."""
-        if not self.paused:
-            self._seconds = (self._seconds + passed / 2) % (self.take.end - self.take.begin + LYING_TIME)
-        return self.take.row(self.take.begin + self._seconds)
