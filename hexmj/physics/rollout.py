@@ -139,9 +139,10 @@ def next_orders(
     rollout: "Rollout", plan: Plan, orders: OrdersFromPlan, ids: np.ndarray, steps: int
 ) -> Iterator[Orders]:
     """Orders of some starts, (n,), for the next steps of a plan, one by one if it has feedback."""
-    for part in [1] * steps if isinstance(plan, FeedbackPlan) else [steps]:
-        if isinstance(plan, FeedbackPlan):
-            plan.sense(rollout.sensed(ids))
+    feedback = plan if isinstance(plan, FeedbackPlan) else None
+    for part in [1] * steps if feedback else [steps]:
+        if feedback:
+            feedback.sense(rollout.sensed(ids))
         if now := orders.ahead(ids, part):
             yield now
 
