@@ -28,7 +28,7 @@ FIGURES: dict[str, dict[str, str]] = {
     "league": {"league": "studies.league_figure:league_figure", "walks": "studies.league_figure:walks_figure"},
     "ablate": {"ablation": "studies.ablation:ablation_figure"},
     "search": {"convergence": "search.results:convergence_figure"},
-    "recording": {"walk": "replay.footfall:walk_figure"},
+    "recording": {"walk": "replay.take:walk_figure"},
 }
 """Attribute `study` of a result -> its figures by name, each a module and a function of it."""
 

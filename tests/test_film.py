@@ -23,10 +23,9 @@ from hexmj.errors import InputError, RenderingError
 from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.rendering import gl
 from hexmj.replay.film import Film, write_film
-from hexmj.replay.footfall import walk_figure
 from hexmj.replay.overlay import Overlay
 from hexmj.replay.recording import record, record_plan
-from hexmj.replay.take import Take, margin_in_words
+from hexmj.replay.take import Take, margin_in_words, walk_figure
 from hexmj.replay.video import _view, render
 from hexmj.starts import draw_starts
 

@@ -14,9 +14,6 @@ from hexmj.rotations import lowest, matrix
 from hexmj.stability import loss_time
 from hexmj.walks import PlannedWalk, Walk
 
-NUMBERS = ("clearance", "tilt", "slip", "depth", "saturation")
-"""Outcomes that every walk has; speed is NaN at V = 0, tracking if no target is on the ground."""
-
 TOPPLED = 0.1
 """Tilt of the trunk beyond which it has toppled, in any direction [rad]."""
 
@@ -163,7 +160,7 @@ class OutcomesSoFar:
             start = int(np.argmax(missed > MOST_UNREACHABLE))
             limit = f"(limit: {MOST_UNREACHABLE:.0%})"
             raise OutOfReach(f"Start {start}: {missed[start]:.0%} of the foot targets are out of reach {limit}.")
-        for name in NUMBERS:
+        for name in ("clearance", "tilt", "slip", "depth", "saturation"):  # speed is NaN at V = 0
             if (wrong := np.isnan(getattr(found, name))).any():
                 raise SimulationError(f"start {int(np.argmax(wrong))}: its {name} is NaN")
         return found

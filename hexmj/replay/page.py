@@ -20,9 +20,6 @@ from hexmj.legs import LEGS
 from hexmj.rendering.shapes import body_shapes, ground_shape, joined
 from hexmj.replay.take import Take, takes_of
 
-MOST_RECORDINGS = 2
-"""Most recordings side by side."""
-
 POSE_INTERVAL = 0.005
 """Time between two poses [s]."""
 
@@ -59,7 +56,7 @@ def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STI
 
 def page_text(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> str:
     """Return the page of one or two recordings as a text, see `page`."""
-    takes = takes_of(recordings, body, MOST_RECORDINGS)
+    takes = takes_of(recordings, body, most=2)
     data = [_page_data(recording, take) for recording, take in zip(recordings, takes, strict=True)]
     escapes = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}  # neither end the script nor begin a comment
     recordings_json = json.dumps(data, allow_nan=False).translate(str.maketrans(escapes))

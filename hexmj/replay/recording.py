@@ -212,14 +212,11 @@ def load_recording(path: Path | str) -> xr.Dataset:
         InputError: the file cannot be read, or is no recording.
     """
     recording = read_netcdf(path)
-    try:
-        check_recording(recording)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    check_recording(recording, f"{path}: ")
     return recording
 
 
-def check_recording(recording: xr.Dataset) -> None:
+def check_recording(recording: xr.Dataset, where: str = "") -> None:
     """Raise InputError if a variable or an attribute of a recording is missing."""
     physical = not MEASURED.keys().isdisjoint(recording.variables)
     variables = TIMES | PLANNED | (MEASURED if physical else {})
@@ -227,7 +224,7 @@ def check_recording(recording: xr.Dataset) -> None:
     missing = [name for name in variables if name not in recording.variables]
     missing += [name for name in attributes if name not in recording.attrs]
     if missing:
-        raise InputError(f"not a recording of hexmj: {', '.join(missing)} missing")
+        raise InputError(f"{where}not a recording of hexmj: {', '.join(missing)} missing")
 
 
 def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Conditions:

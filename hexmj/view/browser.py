@@ -200,10 +200,7 @@ class BrowserView:
             if body not in self._frames:
                 self._frames[body] = scene.add_frame(f"/body_{body}", show_axes=False)
             scene.add_mesh_simple(f"/body_{body}/part_{n}", part.corners, part.faces, color=colour, side="double")
-        self._add_marks(conditions.body.marks)
-
-    def _add_marks(self, marks: Any) -> None:
-        scene, fan = self.server.scene, np.array([(0, i, i + 1) for i in range(1, 5)])
+        marks, fan = conditions.body.marks, np.array([(0, i, i + 1) for i in range(1, 5)])
         self._polygon = scene.add_mesh_simple(
             "/polygon", np.zeros((6, 3)), fan, color=STABLE, opacity=0.45, side="double", cast_shadow=False
         )

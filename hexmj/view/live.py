@@ -1,6 +1,7 @@
 """One insect that walks on and on, whose controller, velocity and conditions may change on the way."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -47,8 +48,6 @@ class Moment:
     """(3,) in the world [mm]."""
     stance: np.ndarray
     """(leg,) which feet stand."""
-    planned_stance: np.ndarray
-    """(leg,) which legs retract in the plan."""
     margin: float
     """Measured stability margin [mm]."""
     planned_margin: float
@@ -99,8 +98,8 @@ class LiveWalk:
         controller: Controller,
         velocity: float,
         start: np.ndarray,
-        conditions: Conditions | None = None,
-        stride: Stride | None = None,
+        conditions: Conditions = Conditions(),
+        stride: Stride = Stride(),
     ) -> None:
         """Settle at a start.
 
@@ -116,7 +115,7 @@ class LiveWalk:
         """
         self.controller, self.velocity = controller, number("velocity", velocity)
         self.start = numbers("start", leg_last(start))
-        self.conditions, self.stride = conditions or Conditions(), stride or Stride()
+        self.conditions, self.stride = conditions, stride
         self.begin()
 
     def begin(self, start: np.ndarray | None = None, conditions: Conditions | None = None) -> None:
@@ -129,20 +128,16 @@ class LiveWalk:
         conditions = conditions or self.conditions
         check_ground(conditions)
         settled = settle(start[np.newaxis], conditions, self.stride, threads=1)
-        plan, before = SteeredPlan(self.controller, settled.starts, self.velocity, self.stride), vars(self).copy()
+        plan = SteeredPlan(self.controller, settled.starts, self.velocity, self.stride)
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
-        self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
-        self._rollout = Rollout(settled, self._push, threads=1)
-        self._push_steps = steps_in_chunk(settled.substeps)
-        self.start, self.conditions, self.settled = start, conditions, settled
-        self.trace, self.fell_on = [], ""
-        self._last_step: PlannedWalk | None = None
-        self._time_left = 0.0
-        try:
+        with self._restored_if_it_fails():
+            self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
+            self._rollout = Rollout(settled, self._push, threads=1)
+            self._push_steps = steps_in_chunk(settled.substeps)
+            self.start, self.conditions, self.settled = start, conditions, settled
+            self.trace, self.fell_on, self._time_left = [], "", 0.0
+            self._last_step: PlannedWalk | None = None
             self._walk(2)  # the second step shows the end of the first
-        except Exception:
-            vars(self).update(before)
-            raise
 
     def steer(self, *, velocity: float | None = None, controller: Controller | None = None) -> bool:
         """Change V_r, the controller, or both, from the next step on.
@@ -157,15 +152,22 @@ class LiveWalk:
         """
         velocity = self.velocity if velocity is None else number("velocity", velocity)
         controller = self.controller if controller is None else controller
-        before, self.velocity, self.controller = (self.velocity, self.controller), velocity, controller
-        try:
+        with self._restored_if_it_fails():
+            self.velocity, self.controller = velocity, controller
             if self._plan.hand_over(controller, velocity):
                 return True
             self.begin()
-        except Exception:
-            self.velocity, self.controller = before
-            raise
         return False
+
+    @contextmanager
+    def _restored_if_it_fails(self) -> Iterator[None]:
+        """Continue the last walk after an error."""
+        before = vars(self).copy()
+        try:
+            yield
+        except Exception:
+            vars(self).update(before)
+            raise
 
     def push(self, impulse: float) -> None:
         """Push from the side at the root, within the next `pushes.PUSH_LASTS` or two. It replaces an earlier push.
@@ -234,7 +236,6 @@ class LiveWalk:
                 planned_tips=tips[column],
                 centre_of_mass=centre[n, 0],
                 stance=walk.stance[n, 0],
-                planned_stance=plan.stance[step, 0],
                 margin=float(margins[n]),
                 planned_margin=float(planned_margins[step]),
             )
