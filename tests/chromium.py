@@ -1,12 +1,10 @@
 """Debian's Chromium without a screen and without a network, driven by the protocol of its developer tools."""
 
-import base64
 import json
 import shutil
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -87,11 +85,6 @@ class Tab:
         """Press and release a key."""
         for kind in ("keyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code="Space" if key == " " else key)
-
-    def screenshot(self, path: Path) -> Path:
-        """Write a screenshot as PNG."""
-        path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
-        return path
 
 
 @contextmanager

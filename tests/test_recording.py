@@ -180,11 +180,8 @@ def test_bad_arguments_are_refused(walked):
         with pytest.raises(InputError, match="start"):
             record(walked, start)
     far = Stride(pep_min=-40.0)
-    for bad, its_stride in (
-        (part_of(plan, slice(5, 9)), stride),
-        (part_of(plan, slice(0)), stride),
-        (walk(np.full((1, 6), -40.0), LDVS, 0.4, 1.0, stride=far), far),
-    ):
+    beyond = walk(np.full((1, 6), -40.0), LDVS, 0.4, 1.0, stride=far)
+    for bad, its_stride in ((part_of(plan, slice(5, 9)), stride), (part_of(plan, slice(0)), stride), (beyond, far)):
         with pytest.raises(InputError, match="plan"):
             record_plan(bad, conditions, its_stride)
     recording = record(walked)

@@ -1,7 +1,6 @@
 """Laws of the tip targets: no jumps, a lift that takes its time in milliseconds, plan and target agree."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -196,12 +195,7 @@ def test_substeps_are_whole_and_short_enough():
     assert Conditions(vp=40.0).seconds(STRIDE) == pytest.approx(0.0025)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [{"vp": 0.0}, {"vp": float("nan")}, {"step_height": -1.0}, {"step_height": 20.0}, {"friction": -0.1},
-     {"lift_time": 0.0}, {"landing_time": 0.0}, {"longest_substep": 1.0}, {"standing_height": float("inf")}],
-    ids=str,
-)  # fmt: skip
-def test_conditions_that_make_no_sense(change: Any):
+@pytest.mark.parametrize("name", ["lift_time", "landing_time", "step_height", "friction", "longest_substep"])
+def test_conditions_out_of_range_are_refused(name: str):
     with pytest.raises(InputError):
-        Conditions(**change)
+        Conditions(**{name: -1.0})
