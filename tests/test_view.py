@@ -25,7 +25,7 @@ from hexmj.view.browser import BrowserView, check_port, page_server
 from hexmj.view.live import LiveWalk
 from hexmj.view.session import LiveSession
 
-STARTS = draw_starts(8, seed=1)
+STARTS, GRAHAM = draw_starts(8, seed=1), load_controller("graham")
 
 
 def view_of(*walk: Any) -> BrowserView:
@@ -71,9 +71,7 @@ def test_the_page_is_served_and_its_sliders_change_the_walk(view):
     assert "<rect" in view._footfall.content
 
 
-@pytest.mark.parametrize(
-    ("controller", "velocity", "vp"), [(LDVS, 0.97, 10.0), (load_controller("graham"), 0.345, 1000.0)]
-)
+@pytest.mark.parametrize(("controller", "velocity", "vp"), [(LDVS, 0.97, 10.0), (GRAHAM, 0.345, 1000.0)])
 def test_sliders_reach_unusual_values_and_only_symmetric_weights_have_some(controller, velocity, vp):
     view = view_of(controller, velocity, STARTS[0], Conditions(vp=vp))
     try:
