@@ -59,7 +59,7 @@ def walking() -> tuple[dict[int, Strides], list[dict[str, float]]]:
     settled = settle(draw_starts(3, 0))
     walks = WalkSettings(LDVS, 0.3, 6 * PERIOD, 3, 0, Conditions(), Stride())
     strides = dict(last_strides(settled, walks, 3 * PERIOD))
-    return strides, [quantities(one, settled.compiled) for one in strides.values()]
+    return strides, [quantities(one) for one in strides.values()]
 
 
 def test_over_strides_the_ground_carries_the_weight_and_neither_drives_nor_brakes(walking):
@@ -78,7 +78,7 @@ def test_vertical_forces_are_what_the_touch_sensors_show_in_steps_taken_in_parts
 
 def test_forces_are_those_that_move_the_centre_of_mass():
     strides, _ = seen(STRIKES, 0.3, 200.0)
-    rows, centre = np.arange(strides.every, len(strides.centre) - 1, strides.every), strides.centre
+    rows, centre = np.arange(m := strides.settled.substeps, len(strides.centre) - 1, m), strides.centre
     moved = STICK_INSECT.mass * (centre[rows + 1] - 2.0 * centre[rows] + centre[rows - 1]) / strides.step**2
     ground = strides.ground.sum(axis=1)[1 : 1 + len(rows)] - [0.0, 0.0, WEIGHT]
     off = np.abs(ground - moved) / WEIGHT
@@ -147,7 +147,7 @@ def test_a_torque_that_rises_and_falls_evenly_is_past_half_its_peak_for_half_a_s
     for leg in range(6):
         for stance in strides.stances(leg):
             torques[stance, 3 * leg + 1] = -np.minimum(part := np.linspace(0.0, 1.0, len(stance)), 1.0 - part)
-    told = quantities(replace(strides, torques=torques), settle(draw_starts(1, 0)).compiled)
+    told = quantities(replace(strides, torques=torques))
     for segment in SEGMENTS:
         assert told[f"{PAST} from, {segment}"] == pytest.approx(25.0, abs=1.5)
         assert told[f"{PAST} until, {segment}"] == pytest.approx(75.0, abs=1.5)

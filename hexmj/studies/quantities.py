@@ -16,7 +16,6 @@ from hexmj.rotations import heading, rotated, turned
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hexmj.bodies.compiled import CompiledBody
     from hexmj.physics.rollout import Chunk
     from hexmj.physics.settle import Settled
 
@@ -79,12 +78,10 @@ HOP = 0.12
 class Strides:
     """Whole strides of one start, from one lift-off of leg 1 to another; row t is a physics step."""
 
+    settled: "Settled"
+    """The start at rest."""
     count: int
     """Number of strides."""
-    step: float
-    """Physics step [s]."""
-    hop: float
-    """Rows off the ground beyond which a foot swings, see `rows_of_a_hop`."""
     qpos: np.ndarray
     """(row, position) before each step."""
     velocity: np.ndarray
@@ -97,10 +94,13 @@ class Strides:
     """(row, leg) feet in contact."""
     centre: np.ndarray
     """(row, 3) centre of mass in the world [mm]."""
-    every: int
-    """Rows between samples of `ground`: a step of the plan."""
     ground: np.ndarray
-    """(sample, leg, 3) forces of the ground on the feet, in the world [g mm/s^2]."""
+    """(sample, leg, 3) forces of the ground on the feet, in the world, once per step of the plan [g mm/s^2]."""
+
+    @property
+    def step(self) -> float:
+        """Physics step [s]."""
+        return self.settled.compiled.model.opt.timestep
 
     def averaged(self, values: np.ndarray, time: float, every: int = 1) -> np.ndarray:
         """Return moving means of values, (n,), in every so many rows, over a time [s]."""
@@ -110,7 +110,7 @@ class Strides:
     def lifted(self, leg: int) -> np.ndarray:
         """Return the rows in which a leg begins to swing, if the strides repeat."""
         rows = len(self.standing)
-        found = onsets(np.tile(self.standing[:, leg], 3), self.hop)
+        found = onsets(np.tile(self.standing[:, leg], 3), rows_of_a_hop(self.settled))
         return found[(found >= rows) & (found < 2 * rows)] - rows
 
     def stances(self, leg: int) -> list[np.ndarray]:
@@ -149,25 +149,23 @@ def strides_between(settled: "Settled", chunks: "Sequence[Chunk]", start: int, b
 
     There are at least two such rows, none among the first two.
     """
-    columns, h = settled.compiled.columns, settled.compiled.model.opt.timestep
-    m, rows = settled.substeps, slice(begun[0], begun[-1])
+    columns, rows = settled.compiled.columns, slice(begun[0], begun[-1])
     qpos, sensors, torque, standing = (
         np.concatenate([getattr(chunk, name)[chunk.ids == start][0] for chunk in chunks])
         for name in ("qpos", "sensors", "torque", "standing")
     )
-    moved, before = np.diff(qpos, axis=0) / h, slice(begun[0] - 1, begun[-1] - 1)  # row t: velocity at row t + 1
+    moved = np.diff(qpos, axis=0) / settled.compiled.model.opt.timestep  # row t: velocity at row t + 1
+    before = slice(begun[0] - 1, begun[-1] - 1)
     return Strides(
+        settled=settled,
         count=len(begun) - 1,
-        step=h,
-        hop=rows_of_a_hop(settled),
         qpos=qpos[rows],
         velocity=moved[before, :3],
         turning=moved[before, columns.qpos],
         torques=torque[before],
         standing=standing[rows],
         centre=sensors[rows, columns.centre_of_mass],
-        every=m,
-        ground=-sensors[rows][::m, columns.feet_push].reshape(-1, 6, 3),
+        ground=-sensors[rows][:: settled.substeps, columns.feet_push].reshape(-1, 6, 3),
     )
 
 
@@ -200,21 +198,21 @@ def quantity_table(walks: WalkSettings, measured: float, threads: int | None = N
     settled = Settling(walks.conditions, walks.stride, threads, pushes=True).at(walks.starts)
     values = np.full((len(UNITS), walks.n_starts), np.nan)
     for start, strides in last_strides(settled, walks, measured, threads):
-        values[:, start] = list(quantities(strides, settled.compiled).values())
+        values[:, start] = list(quantities(strides).values())
     return xr.Dataset({"value": (("quantity", "start"), values, {"units": "of the quantity"})}, {"quantity": [*UNITS]})
 
 
-def quantities(strides: Strides, compiled: "CompiledBody") -> dict[str, float]:
+def quantities(strides: Strides) -> dict[str, float]:
     """Return every quantity by name; NaN without the joints for it, or for a leg that never carries."""
     parts = (_gait, _forces, _torques, _posture, _work)
-    values = {name: value for part in parts for name, value in part(strides, compiled).items()}
+    values = {name: value for part in parts for name, value in part(strides).items()}
     for name in EACH.keys() & values.keys():
         pairs = np.reshape(values.pop(name), (2, 3)).mean(axis=0)
         values |= {f"{name}, {segment}": value for segment, value in zip(SEGMENTS, pairs, strict=True)}
     return {name: float(values.get(name, np.nan)) for name in UNITS}
 
 
-def _gait(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+def _gait(strides: Strides) -> dict[str, Any]:
     carries = strides.ground[..., 2] > 0
     ahead, duty = _ahead(strides), carries[:, carries.any(axis=0)].mean()
     speed, period = ahead.mean(), len(ahead) * strides.step / strides.count
@@ -231,12 +229,12 @@ def _gait(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     }
 
 
-def _forces(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+def _forces(strides: Strides) -> dict[str, Any]:
     """Return the forces of the ground on the feet, along the body's heading."""
-    share = strides.ground / compiled.weight
-    level = turned(share[..., :2], -heading(strides.qpos[:: strides.every, 3:7]))
+    share = strides.ground / strides.settled.compiled.weight
+    level = turned(share[..., :2], -heading(strides.qpos[:: strides.settled.substeps, 3:7]))
     ahead, inward, up = level[..., 0], -np.array(SIDE) * level[..., 1], share[..., 2]
-    peaks = np.array([strides.averaged(leg, PLATE, strides.every).max() for leg in up.T])
+    peaks = np.array([strides.averaged(leg, PLATE, strides.settled.substeps).max() for leg in up.T])
     peaks = np.where((up > 0).any(axis=0), peaks, np.nan)
     pairs = peaks.reshape(2, 3).mean(axis=0)
     impulses = {"vertical": up, "fore-aft": ahead, "inward": inward}
@@ -246,7 +244,7 @@ def _forces(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     }
 
 
-def _torques(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+def _torques(strides: Strides) -> dict[str, Any]:
     """Return the torques of the servos while their leg stands, and the work that they do then."""
     torque = strides.torques.reshape(len(strides.torques), 6, -1)
     if torque.shape[2] != len(JOINTS):
@@ -280,11 +278,12 @@ def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
     return mean * np.sign(mean.mean())
 
 
-def _posture(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+def _posture(strides: Strides) -> dict[str, Any]:
     """Return heights of the coxae over the ground, and the pitch of the line from hind to front coxae."""
     from hexmj.bodies.ground import ground_level
     from hexmj.bodies.kinematics import joint_numbers, posed
 
+    compiled = strides.settled.compiled
     first = joint_numbers(compiled.model, compiled.body)[:, 0]
     coxae = posed(compiled.model, compiled.home).xpos[compiled.model.jnt_bodyid[first]]  # (leg, 3) in the root frame
     places = strides.qpos[:, None, :3] + rotated(strides.qpos[:, None, 3:7], coxae)
@@ -300,10 +299,11 @@ def _posture(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
     }
 
 
-def _work(strides: Strides, compiled: "CompiledBody") -> dict[str, Any]:
+def _work(strides: Strides) -> dict[str, Any]:
     """Return work over the insect's own weight and way; negative work of a joint is lost, and costs nothing or as much
     as positive work."""
-    power, gravity = strides.torques * strides.turning, compiled.weight / compiled.body.mass
+    power, compiled = strides.torques * strides.turning, strides.settled.compiled
+    gravity = compiled.weight / compiled.body.mass
     rate = compiled.weight * _ahead(strides).mean()
     positive = np.maximum(power, 0.0).sum(axis=1).mean() / rate
     centre = np.stack([strides.averaged(axis, FRAME) for axis in strides.centre.T], axis=1)

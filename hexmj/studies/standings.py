@@ -210,13 +210,10 @@ def _ranks(shown: "xr.Dataset") -> Table:
     rows = []
     for (name, *cells), missing in zip(_rows(shown, row), shown.missing.sum("velocity"), strict=True):
         rules = f" ({words})" if (words := network_rules(controllers[name])) else ""
-        rows.append((name + rules + _missing(missing), *cells))
+        lost = f" (walks missing: {missing.item():g})" if missing else ""
+        rows.append((name + rules + lost, *cells))
     title = "Standings: means over the velocities, and ranks where intervals separate them; = is a tie"
     return Table(title, ("controller", *MEASURES, "J_N, 0.1 to 0.5", "accelerated to 0.9"), rows)
-
-
-def _missing(count: "xr.DataArray") -> str:
-    return f" (walks missing: {count.item():g})" if count else ""
 
 
 def place(one: "xr.Dataset") -> str:
@@ -269,9 +266,8 @@ def _costs(at: "xr.Dataset") -> Table:
         costs = (f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque"))
         return map(_known, (*costs, f"{one.torque.item() / WEDGED:.2f}"))
 
-    rows = [(name + _missing(n), *cells) for (name, *cells), n in zip(_rows(at, row), at.missing, strict=True)]
     head = ("controller", "speed kept", "slip [mm/s]", "cost of transport", "peak torque", "of a cockroach's")
-    return Table(f"Walks without a fall at V = {at.velocity.item():g}", head, rows)
+    return Table(f"Walks without a fall at V = {at.velocity.item():g}", head, _rows(at, row))
 
 
 def _short(value: float) -> str:
