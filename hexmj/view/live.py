@@ -48,6 +48,8 @@ class Moment:
     """(3,) in the world [mm]."""
     stance: np.ndarray
     """(leg,) which feet stand."""
+    planned_stance: np.ndarray
+    """(leg,) which legs retract in the plan."""
     margin: float
     """Measured stability margin [mm]."""
     planned_margin: float
@@ -236,6 +238,7 @@ class LiveWalk:
                 planned_tips=tips[column],
                 centre_of_mass=centre[n, 0],
                 stance=walk.stance[n, 0],
+                planned_stance=plan.stance[step, 0],
                 margin=float(margins[n]),
                 planned_margin=float(planned_margins[step]),
             )
