@@ -81,8 +81,6 @@ class FlssOptions:
     """Options of FLSS."""
 
     controller: Controller
-    velocities: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
     n_starts: int | None = None
     """Number of random starts; by default 7000 (seven samples of 1000, as in the paper), or 200 with --physical."""
     out: Path | None = None

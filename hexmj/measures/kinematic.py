@@ -93,8 +93,8 @@ class KinematicFlss:
 
     controller: Controller
     """Controller that plans the walks."""
-    velocities: Sequence[float]
-    """Velocities V_r (final ones when accelerating), each 0 <= V < 1."""
+    velocities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
     n_starts: int = 7 * SAMPLE
     """Number N of random starts, the same for every velocity."""
     observation_time: str | float = "walk"
