@@ -151,14 +151,11 @@ class LargerPlan:
     starts: np.ndarray
     stride: hexmj.Stride
     times: float
-
-    @property
-    def done(self):
-        """Steps planned so far."""
-        return self.plan.done
+    done: int = 0
 
     def advance(self, steps):
         """Plan the next steps."""
+        self.done += steps
         walk = self.plan.advance(steps)
         larger = {name: self.times * getattr(walk, name) for name in ("time", "x", "y", "aep", "height")}
         return replace(walk, geometry=self.stride.geometry, **larger)

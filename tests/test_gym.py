@@ -290,7 +290,7 @@ def test_bad_actions_are_refused(kind):
 @pytest.mark.parametrize("name", ["actions", "render_mode", "autoreset_mode"])
 def test_bad_settings_are_refused(name):
     with pytest.raises(InputError, match=name):
-        StickInsects(**{name: "nothing"})
+        StickInsects(**{name: "nothing"})  # pyright: ignore[reportArgumentType]
 
 
 def test_bad_seeds_and_masks_are_refused():

@@ -135,7 +135,7 @@ def test_a_larger_body_senses_the_same():
 
 def test_a_kinematic_walk_is_upright_at_the_commanded_velocity():
     plan = WithOffsets(Ahead()).begin(np.zeros((2, 6)), np.array([0.5, 0.2]), hexmj.Stride())
-    upright = plan._upright(np.array([0.5, 0.2]))
+    upright = plan._upright(np.array([0.5, 0.2]))  # pyright: ignore[reportAttributeAccessIssue]
     np.testing.assert_allclose(upright[:, VELOCITY] * 50.0, [[40.0, 0.0, 0.0], [16.0, 0.0, 0.0]])
     assert np.abs(upright[:, TIPS]).max() < 5.0
 

@@ -32,7 +32,7 @@ def advanced_plan(settled):
 class Short:
     """A plan that stops short of what it is asked for."""
 
-    def __init__(self, starts):
+    def __init__(self, starts: np.ndarray):
         self._plan, self.starts, self.stride, self.done = plan_of(starts), starts, STRIDE, 0
 
     def advance(self, steps):

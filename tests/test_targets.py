@@ -198,4 +198,4 @@ def test_substeps_are_whole_and_short_enough():
 @pytest.mark.parametrize("name", ["lift_time", "landing_time", "step_height", "friction", "longest_substep"])
 def test_conditions_out_of_range_are_refused(name: str):
     with pytest.raises(InputError):
-        Conditions(**{name: -1.0})
+        Conditions(**{name: -1.0})  # pyright: ignore[reportArgumentType]
