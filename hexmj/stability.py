@@ -42,14 +42,7 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
     tips, stands = _checked(feet, stance)
     if stands.shape[-1:] != (6,):
         raise InputError(f"stance has the shape {stands.shape}; expected (..., leg) with 6 legs")
-    points, standing = np.ascontiguousarray(tips).reshape(-1, 6, 2), stands.reshape(-1, 6)
-    margin = np.empty(len(points))
-
-    def work(begin: int, end: int) -> None:
-        margins(points[begin:end], standing[begin:end], margin[begin:end])
-
-    run_blocks(work, len(points), BLOCK, threads)
-    return margin.reshape(stands.shape[:-1])
+    return _margins(tips, stands, threads)
 
 
 def _checked(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
@@ -62,9 +55,24 @@ def _checked(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray
     return tips, stands
 
 
+def _margins(tips: np.ndarray, stands: np.ndarray, threads: int | None) -> np.ndarray:
+    """Return `stability_margin` of valid postures."""
+    points, standing = np.ascontiguousarray(tips).reshape(-1, 6, 2), stands.reshape(-1, 6)
+    margin = np.empty(len(points))
+
+    def work(begin: int, end: int) -> None:
+        margins(points[begin:end], standing[begin:end], margin[begin:end])
+
+    if len(points) <= BLOCK:
+        work(0, len(points))
+    else:
+        run_blocks(work, len(points), BLOCK, threads)
+    return margin.reshape(stands.shape[:-1])
+
+
 def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
     """The stability margin after each step, (step, start) [mm]; NaN where no tip is known (after a fall)."""
-    margin = stability_margin(walk.feet, walk.stance, threads)
+    margin = _margins(walk.feet, walk.stance, threads)
     return np.where(np.isnan(walk.x + walk.y).all(axis=-1), np.nan, margin)
 
 

@@ -196,7 +196,10 @@ class NetworkPlan:
         def work(begin: int, end: int) -> None:
             kernel.record(self._blocks, begin, end, *self.constants, velocity, x, stance)
 
-        run_blocks(work, len(self._blocks), 1, self.threads)
+        if len(self._blocks) == 1:
+            work(0, 1)
+        else:
+            run_blocks(work, len(self._blocks), 1, self.threads)
         self.done += steps
         time = np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt
         geometry = self.stride.geometry
