@@ -1,15 +1,15 @@
-"""The insect as an environment for learning and control: `dm` for dm_env, `gym` and `vector` for Gymnasium.
+"""Environments for learning and control: `dm` for dm_env, `gym` and `vector` for Gymnasium, and `stable_baselines`.
 
-If Gymnasium is installed, this import registers its ids. `gymnasium.make("hexmj.environments:hexmj/StickInsect-v0")`
-imports this package first.
+Importing this package registers the ids of `IDS` if Gymnasium is installed. The prefix in
+`gymnasium.make("hexmj.environments:hexmj/StickInsect-v0")` makes Gymnasium import it.
 """
 
 IDS = {"hexmj/StickInsect-v0": "joints", "hexmj/StickInsectTips-v0": "tips"}
-"""Gymnasium's id -> kind of actions."""
+"""Environment id in Gymnasium -> kind of actions, see `task.Actions`."""
 
 try:
     from gymnasium import register
-except ImportError:  # an optional dependency
+except ImportError:  # Gymnasium is optional
     pass
 else:
     for _id, _actions in IDS.items():

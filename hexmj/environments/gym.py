@@ -1,7 +1,7 @@
 """One insect as a Gymnasium environment: `hexmj/StickInsect-v0` and `hexmj/StickInsectTips-v0`.
 
-`task` describes episodes, observations and rewards. Actions are normalised: 0 is the usual action, home posture or no
-offset; -1 and 1 are the ends of the joints' ranges or the largest offsets.
+`task` describes episodes, observations and rewards. Actions are normalised to -1 ... 1. Joint targets: 0 is the home
+posture, -1 and 1 are the ends of the joints' ranges. Tip offsets: 0 is no offset, -1 and 1 are the largest offsets.
 """
 
 import atexit
@@ -29,22 +29,22 @@ SIZE = 480, 640
 
 
 class Insects:
-    """What the environments of one insect and of many share."""
+    """Base class of the environments of one insect (`StickInsect`) and of many (`vector.StickInsects`)."""
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 800}  # noqa: RUF012  # Gymnasium reads the class
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 800}  # noqa: RUF012  # Gymnasium reads the class attribute
 
     def prepare(self, render_mode: str | None, task: dict[str, Any]) -> tuple[Any, spaces.Box]:
         """Compile the body of a `task.Task`, and return the spaces of one insect's observations and actions.
 
         Raises:
-            InputError: a value is out of its range.
+            InputError: a field of the task is out of its range, or the render mode is unknown.
         """
         if render_mode not in (None, "rgb_array"):
-            raise InputError(f"render_mode = {render_mode!r:.80}; valid names: rgb_array, or None")
+            raise InputError(f"render_mode = {render_mode!r:.80}; expected 'rgb_array' or None")
         self.task, self.render_mode = Task(**task), render_mode
         conditions, stride = self.task.conditions, self.task.stride
         self._compiled = compile_body(conditions, conditions.timestep(stride), looks=False)
-        fps = max(1, round(1.0 / conditions.seconds(stride)))  # one frame after each step gives a film in real time
+        fps = max(1, round(1.0 / conditions.seconds(stride)))  # real time, with one frame after each step
         self.metadata = Insects.metadata | {"render_fps": fps}
         self._frames = Frames(conditions) if render_mode else None
         bounds = observation_bounds(self._compiled, self.task).items()
@@ -53,27 +53,27 @@ class Insects:
         return spaces.Dict(observed), spaces.Box(-1.0, 1.0, (numbers,), np.float32)
 
     def close(self, **kwargs: Any) -> None:
-        """Free the renderer."""
+        """Free the renderer; keyword arguments have no effect."""
         if self._frames:
             self._frames.close()
 
     def __reduce__(self) -> Any:
-        """Refuse copies, which would not share the memory that MuJoCo steps."""
-        raise InputError("an environment cannot be copied or pickled; make another one")
+        """Raise InputError: a copy or pickle would not refer to the memory in which MuJoCo steps the insect."""
+        raise InputError("an environment cannot be copied or pickled; make a new one")
 
 
 class StickInsect(Insects, gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
-    """One insect that walks in an episode of its own."""
+    """Gymnasium environment of one insect."""
 
     def __init__(self, *, render_mode: str | None = None, **task: Any) -> None:
         """Make the environment of a `task.Task`.
 
         Args:
-            render_mode: 'rgb_array' for `render`.
-            task: velocity, actions, controller, conditions, stride, duration.
+            render_mode: 'rgb_array' if `render` should return frames, else None.
+            task: fields of `task.Task`: velocity, actions, controller, conditions, stride, duration.
 
         Raises:
-            InputError: a value is out of its range.
+            InputError: an argument is out of its range.
         """
         self.observation_space, self.action_space = self.prepare(render_mode, task)
         self.model = self._compiled.model
@@ -84,33 +84,33 @@ class StickInsect(Insects, gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Begin an episode. With a seed, it takes the first of `hexmj.draw_starts` with that seed, then the next ones.
+        """Begin an episode: after a seed at the first of `hexmj.draw_starts` with this seed, else at the next start.
 
         Args:
-            seed: seed of the starts.
-            options: no effect.
+            seed: seed of the starts; None draws the next start.
+            options: has no effect.
 
         Raises:
-            SimulationError: the start does not settle.
+            SimulationError: the insect does not come to rest at the start.
         """
         super().reset(seed=seed)
         self._walkers.begin(np.arange(1), draw_start(self.np_random, self.task))
         return self._observation(), {}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
-        """Take one step of the plan, with its substeps.
+        """Take one step of the plan, which is several substeps of the physics.
 
         Raises:
             InputError: the action is out of bounds, or the episode has ended.
             SimulationError: the simulation diverged.
         """
         if self._walkers.over:
-            raise InputError("the episode has ended; reset it first")
+            raise InputError("the episode has ended; call reset() first")
         acted = self._walkers.act(checked_actions(action, self.action_space.shape)[np.newaxis])
         return self._observation(), float(acted.reward[0]), bool(acted.terminated[0]), bool(acted.truncated[0]), {}
 
     def render(self) -> np.ndarray | None:
-        """Return a frame, (height, width, 3), with `render_mode`."""
+        """Return an image of the insect, (height, width, 3) of uint8, or None without a `render_mode`."""
         return self._frames.draw(self.data.qpos) if self._frames else None
 
     def _observation(self) -> dict[str, np.ndarray]:
@@ -118,26 +118,26 @@ class StickInsect(Insects, gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
 
 class Frames:
-    """Draws a body from the first camera of its description; the stick insect's follows it."""
+    """Draws a body from the first camera of its description; the stick insect's first camera follows the insect."""
 
     def __init__(self, conditions: Conditions) -> None:
-        """Compile the body; the renderer begins with the first frame."""
+        """Compile the body; the first frame creates the renderer."""
         self._cameras, self._renderer = conditions.body.cameras[:1], None
         self._model = compile_body(conditions).model
         self._model.vis.global_.offheight, self._model.vis.global_.offwidth = SIZE
 
     def draw(self, qpos: np.ndarray) -> np.ndarray:
-        """Draw the body at some `qpos`, (height, width, 3) of uint8."""
+        """Return an image, (height, width, 3) of uint8, of the body at the positions `qpos`, (position,)."""
         if self._renderer is None:
             self._data, self._renderer = mujoco.MjData(self._model), gl.Renderer(self._model, *SIZE)
-            atexit.register(self.close)  # before OpenGL ends
+            atexit.register(self.close)  # frees the renderer before OpenGL ends
         self._data.qpos[:] = qpos
         mujoco.mj_forward(self._model, self._data)
         self._renderer.update_scene(self._data, *self._cameras)
         return self._renderer.render()
 
     def close(self) -> None:
-        """Free the renderer; it may be called again."""
+        """Free the renderer; further calls have no effect."""
         if self._renderer:
             self._renderer.close()
             atexit.unregister(self.close)

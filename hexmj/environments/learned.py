@@ -1,9 +1,9 @@
 """A learned policy as a controller: it adds offsets to the tips that another controller plans.
 
-A policy receives sensed numbers (`felt`), in an environment from its observations and in a walk of the package from
-`Sensed`. It answers with actions of the environment with offsets, each from -1 to 1. A policy that was trained in the
-environment therefore walks wherever a controller does, the league included. In a kinematic walk nothing is sensed:
-there the insect is upright, walks at the commanded velocity and stands on the feet that it plans to stand on.
+A policy maps sensed numbers (`felt`) to tip offsets, each from -1 to 1. An environment computes the sensed numbers from
+its observations, a physical walk from `Sensed`. A policy trained in an environment can therefore walk wherever a
+controller does, for example in the league. A kinematic walk senses nothing: the policy receives the numbers of an
+upright insect that walks at the commanded velocity and stands on all feet that the plan puts in stance.
 """
 
 from dataclasses import dataclass, field, replace
@@ -24,47 +24,47 @@ from hexmj.walks import PlannedWalk, copied, joined
 
 TILT, VELOCITY, TURNING = slice(0, 2), slice(2, 5), slice(5, 8)
 CONTACT, STANCE, TIPS = slice(8, 14), slice(14, 20), slice(20, 38)
-"""Columns of the sensed numbers, see `felt`."""
+"""Columns of the array of sensed numbers, (n, `FELT`), see `felt`."""
 
 FELT = 38
-"""Number of sensed numbers."""
+"""Number of the sensed numbers of one insect."""
 
 OBSERVED = "orientation", "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
-"""Observations of an environment from which the sensed numbers are computed."""
+"""Names of the observations from which `felt_in` computes the sensed numbers."""
 
 MOST = 10.0
-"""Bound of the sensed numbers, in units of their usual sizes."""
+"""Largest magnitude of a sensed number, in units of its scale, see `felt`."""
 
 
 class Policy(Protocol):
-    """A frozen dataclass of plain data that answers sensed numbers, (n, `FELT`), with actions, (n, leg * axis)."""
+    """Protocol of a policy, a frozen dataclass of plain data: sensed numbers, (n, `FELT`) -> (n, leg * axis)."""
 
     def __call__(self, felt: np.ndarray) -> np.ndarray:
-        """Return offsets forward, left and up of each tip, in `Lengths.largest_tip_offset`, clipped to -1 and 1.
+        """Return offsets of each tip forward, left and up, in units of `Lengths.largest_tip_offset`.
 
-        In a walk, tips are also clipped to the range between PEP_min and AEP_0, unless the plan itself goes beyond:
-        controllers keep their tips there (`check-controller`). The environment does not clip them.
+        Offsets are clipped to -1 ... 1. `WithOffsets` also keeps the tips between PEP_min and AEP_0, unless the plan
+        itself exceeds this range, because controllers must stay in it. An environment does not limit the tips so.
         """
         ...
 
 
 def felt(body: Body, *parts: np.ndarray) -> np.ndarray:
-    """Return the numbers that policies receive, (n, `FELT`), clipped to `MOST`.
+    """Return the sensed numbers that policies receive, (n, `FELT`), clipped to -`MOST` ... `MOST`.
 
     Args:
-        body: its standing height scales lengths and velocities.
+        body: the body whose standing height scales lengths and velocities.
         parts: tilt ahead and to the left, velocity, turning, contact, planned stance and planned tips, each (n, ...).
-            They are divided by their usual sizes: 0.1 rad, five standing heights a second, 2 rad/s, 1, 1, and a
-            standing height.
+            Each is divided by its scale: 0.1 rad, five standing heights per second, 2 rad/s, 1, 1, and one standing
+            height.
     """
     count, high = len(parts[0]), body.standing_height
-    usual = 0.1, 5.0 * high, 2.0, 1.0, 1.0, high
-    columns = [part.reshape(count, -1) / size for part, size in zip(parts, usual, strict=True)]
+    scales = 0.1, 5.0 * high, 2.0, 1.0, 1.0, high
+    columns = [part.reshape(count, -1) / size for part, size in zip(parts, scales, strict=True)]
     return np.concatenate(columns, axis=1).clip(-MOST, MOST)
 
 
 def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> np.ndarray:
-    """Return the sensed numbers, (n, `FELT`), of a vector environment's observations; of a single one (`FELT`,)."""
+    """Return sensed numbers from observations: of a vector environment (n, `FELT`), of a single one (`FELT`,)."""
     orientation, *others = (np.asarray(observations[name]) for name in OBSERVED)
     tilt = np.arcsin(np.clip(lean(orientation.reshape(-1, 4))[0], -1.0, 1.0))
     sensed = felt(body, tilt, *others)
@@ -73,28 +73,28 @@ def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> n
 
 @dataclass(frozen=True)
 class WithOffsets(Wrapper):
-    """A controller whose planned tips are offset by a policy."""
+    """A controller that adds a policy's offsets to the tips that another controller plans."""
 
     controller: Controller = field(default=LDVS, kw_only=True)
-    """The controller that plans."""
+    """The controller that plans the tips."""
     policy: Policy
-    """The learned policy."""
+    """The learned policy, which returns the offsets."""
     conditions: Conditions = field(default_factory=Conditions)
-    """Conditions of the walk: their V_p and foot path lift and lower the feet, and their body scales the offsets.
-    Physical walks under other conditions are refused."""
+    """Conditions of the walk: their V_p and foot path lift and lower the feet, and their body scales the offsets. A
+    physical walk under other conditions raises InputError."""
     name: str = "learned"
 
     def wrap(self, plan: Any) -> "OffsetPlan":
-        """See `Wrapper`; the inner controller must not be made for other conditions."""
+        """Return the plan with offsets; raise InputError if the inner plan is made for other conditions."""
         check_made_for(plan, self.conditions)
         return OffsetPlan(plan, self.policy, self.conditions)
 
 
 class OffsetPlan(WrappedPlan):
-    """A `protocol.FeedbackPlan`: another plan's tips with a policy's offsets, and the heights of the foot path."""
+    """A `protocol.FeedbackPlan`: the tips of another plan, lifted by the foot path, plus a policy's offsets."""
 
     def __init__(self, plan: Plan, policy: Policy, conditions: Conditions) -> None:
-        """Wrap a plan at time 0."""
+        """Wrap a plan that has not advanced yet."""
         super().__init__(plan)
         self._policy, self.made_for = policy, conditions
         self._targets = TipTargets(plan.starts, conditions, plan.stride)
@@ -103,7 +103,7 @@ class OffsetPlan(WrappedPlan):
         self._felt, self._sensed = np.zeros((len(plan.starts), FELT)), np.zeros((len(plan.starts), 1), dtype=bool)
 
     def sense(self, sensed: Sensed) -> None:
-        """Store the sensed numbers for the policy, and pass them on to a plan with sensory feedback."""
+        """Store the sensed numbers for the policy; pass `sensed` on if the inner plan has sensory feedback."""
         if isinstance(self._plan, FeedbackPlan):
             self._plan.sense(sensed)
         self._sensed[sensed.ids] = True
@@ -113,7 +113,7 @@ class OffsetPlan(WrappedPlan):
         )
 
     def advance(self, steps: int) -> PlannedWalk:
-        """Plan the next steps, each with the policy's offsets for what is sensed then."""
+        """Plan the next steps; the policy computes the offsets of each step from the numbers sensed last."""
         return joined([self._step() for _ in range(steps)])
 
     def _step(self) -> PlannedWalk:
@@ -122,7 +122,7 @@ class OffsetPlan(WrappedPlan):
         actions = np.asarray(self._policy(seen), dtype=float)
         if actions.shape != (count, 18) or np.isnan(actions).any():
             raise InputError(
-                f"a policy returned NaN or the shape {actions.shape}; expected (start, leg * axis), {(count, 18)}"
+                f"the policy returned NaN or the shape {actions.shape}; expected numbers of shape {(count, 18)}"
             )
         offset = np.clip(actions, -1.0, 1.0).reshape(count, 6, 3)
         offset = self.made_for.body.lengths.largest_tip_offset * offset
@@ -134,7 +134,7 @@ class OffsetPlan(WrappedPlan):
         return replace(step, x=x[None], y=y[None], height=height[None])
 
     def _upright(self, velocity: np.ndarray) -> np.ndarray:
-        """Return the sensed numbers of a kinematic walk."""
+        """Return the numbers that an upright, undisturbed insect would sense at a velocity, (start,)."""
         still = np.zeros((len(self.starts), 3))
         ahead = np.stack([velocity * self.made_for.vp, still[:, 0], still[:, 0]], axis=1)
         return felt(self.made_for.body, still[:, :2], ahead, still, self._stance, self._stance, self._tips)

@@ -1,7 +1,7 @@
-"""Tip targets, observations and rewards of all insects at once, in compiled passes.
+"""Tip targets, observations and rewards of all insects, in compiled loops.
 
-For one insect a dozen calls of NumPy take as long as its physics. `tests/plain_observations.py` has the same formulas
-in plain NumPy, and a test compares the two.
+The loops are compiled because a dozen calls of NumPy take as long as the physics of one insect. A test compares them
+with the same formulas in plain NumPy (`tests/plain_observations.py`).
 """
 
 from typing import Any, NamedTuple
@@ -16,34 +16,34 @@ from hexmj.stability import margins
 
 
 class Places(NamedTuple):
-    """The state of some insects now."""
+    """Current states of n insects: positions, velocities, root rotations and sensors."""
 
     qpos: np.ndarray
-    """(n, position)."""
+    """MuJoCo's qpos, (n, position)."""
     qvel: np.ndarray
-    """(n, velocity)."""
+    """MuJoCo's qvel, (n, velocity)."""
     rotation: np.ndarray
-    """From the root frames to the world, (n, axis, axis)."""
+    """Rotations from the root frames to the world, (n, axis, axis)."""
     sensors: np.ndarray
-    """(n, column); the columns that measure places are current."""
+    """Sensor values, (n, column); only sensors of MuJoCo's position stage are current."""
 
 
 class Planned(NamedTuple):
-    """The plans of some insects now."""
+    """Planned stance and tips of n insects at the current step, and their targets out of reach."""
 
     stance: np.ndarray
-    """Legs that may stand, (n, leg) of 0 and 1."""
+    """1 for legs that the plan puts in stance, else 0; (n, leg)."""
     tips: np.ndarray
-    """Tips in the root frame, without offsets, (n, leg, axis) [mm]."""
+    """Planned tips in the root frame, without the offsets of the action, (n, leg, axis) [mm]."""
     missed: np.ndarray
-    """Substeps of the last step in which a tip was out of reach, (n, leg)."""
+    """Number of substeps of the last step in which the tip target was out of reach, (n, leg)."""
 
 
 class Observer:
-    """Observes insects of one body in one task."""
+    """Computes the observations of insects with the same body and task."""
 
     def __init__(self, compiled: CompiledBody, task: Task) -> None:
-        """Prepare the layout of the observations, which `task` describes."""
+        """Prepare bounds and layout of the observations, which `task` describes."""
         bounds, columns = observation_bounds(compiled, task), compiled.columns
         self._bounds = np.array([np.concatenate([pair[k].ravel() for pair in bounds.values()]) for k in (0, 1)])
         self._corners, no_foot = compiled.trunk_corners, compiled.body.lengths.no_foot_margin
@@ -55,19 +55,19 @@ class Observer:
         ]
 
     def observe(self, places: tuple[Any, ...], standing: np.ndarray, planned: tuple[Any, ...]) -> np.ndarray:
-        """Return all observations of some insects, (n, number).
+        """Return the observations of n insects as flat vectors, (n, number).
 
         Args:
             places: `Places` as a plain tuple, which compiled code receives faster.
-            standing: feet that stand, (n, leg).
+            standing: whether each foot stands on the ground, (n, leg).
             planned: `Planned` as a plain tuple.
         """
         flat = np.empty((len(standing), self._bounds.shape[1]))
-        observe(places, self._corners, standing, planned, self._bounds, self._layout, flat)
+        write_observations(places, self._corners, standing, planned, self._bounds, self._layout, flat)
         return flat
 
     def named(self, flat: np.ndarray) -> dict[str, np.ndarray]:
-        """Return observations, (..., number), by name and in their shapes."""
+        """Return flat observations, (..., number), as arrays by name, each in its own shape."""
         before = flat.shape[:-1]
         return {
             name: flat[columns].reshape(before + shape) if shape else flat[columns]
@@ -76,16 +76,16 @@ class Observer:
 
 
 @jitted
-def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
-    """Return the tip targets of some insects for their next step, (n, substep, leg, axis) [mm].
+def next_targets(actions: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
+    """Return the tip targets of n insects for the next step, in the root frame, (n, substep, leg, axis) [mm].
 
     Args:
-        wanted: values of their actions, (n, number).
-        ids: insects, (n,).
-        ahead: planned tips (insect, step, substep, leg, axis), stance (insect, step, leg), and the index of the next
-            step, (insect,), which is advanced.
-        planned: `Planned` of all insects, which is updated.
-        offset: whether actions are offsets to the tips.
+        actions: joint targets [rad] or tip offsets [mm], (n, number).
+        ids: indices of the insects, (n,).
+        ahead: of all insects, planned tips (insect, step, substep, leg, axis), stance (insect, step, leg), and the
+            index of the next step, (insect,), which this function increments.
+        planned: `Planned` of all insects, which this function updates.
+        offset: whether the actions are tip offsets, which are then added to the planned tips.
     """
     tips_ahead, stance_ahead, at = ahead
     tips = np.empty((len(ids), tips_ahead.shape[2], 6, 3))
@@ -96,23 +96,25 @@ def order(wanted: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
                 for sub in range(tips.shape[1]):
                     tips[i, sub, leg, axis] = tips_ahead[n, at[n], sub, leg, axis]
                     planned[1][n, leg, axis] = tips[i, sub, leg, axis]
-                    tips[i, sub, leg, axis] += wanted[i, 3 * leg + axis] if offset else 0.0
+                    tips[i, sub, leg, axis] += actions[i, 3 * leg + axis] if offset else 0.0
         at[n] += 1
     return tips
 
 
 @jitted
-def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any) -> None:
-    """Write all observations into `flat`, (n, number), in the order of `task.observation_bounds`.
+def write_observations(
+    places: Any, corners: Any, standing: Any, planned: Any, bounds: Any, layout: Any, flat: Any
+) -> None:
+    """Write the observations of n insects into `flat`, (n, number), in the order of `task.observation_bounds`.
 
     Args:
         places: `Places` of the insects.
-        corners: of the trunk, (corner, axis), and their radii, (corner,) [mm].
-        standing: feet that stand, (n, leg).
+        corners: corners of the trunk in the root frame, (corner, axis), and their radii, (corner,) [mm].
+        standing: whether each foot stands on the ground, (n, leg).
         planned: `Planned` of the insects.
-        bounds: least and greatest value of every number, (2, number).
-        layout: number of joints, first sensor columns of feet and centre of mass, the command, and the margin without
-            a foot in contact.
+        bounds: smallest and largest allowed value of every number, (2, number).
+        layout: number of joints, first sensor columns of feet and of the centre of mass, commanded velocity [mm/s],
+            and the margin [mm] that is observed if no foot is in contact.
     """
     joints, foot, centre, command, no_foot = layout
     around, margin = np.empty((1, 6, 2)), np.empty(1)
@@ -153,17 +155,17 @@ def observe(places: Any, corners: Any, standing: Any, planned: Any, bounds: Any,
 
 
 @jitted
-def judge(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time: Any, result: Any) -> bool:
-    """Compute rewards and ends of the insects that took a step.
+def end_step(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time: Any, result: Any) -> bool:
+    """Compute the rewards of insects that took a step, and which of their episodes it ended.
 
     Args:
         places: `Places` of all insects after the step.
-        ids: insects that took the step, (n,).
-        sensors: at the beginning of each substep, (n, substep, column).
-        trunk: first column of the contacts of the trunk's parts, and the one after the last.
+        ids: indices of the insects that took the step, (n,).
+        sensors: sensor values at the beginning of each substep, (n, substep, column).
+        trunk: first sensor column of the trunk's contacts, and the column after the last.
         command: commanded velocity [mm/s].
-        time: steps that all insects have taken, (insect,), which are advanced, and the steps of an episode.
-        result: rewards, falls and ends of time, each (insect,), filled with 0 before; updated.
+        time: steps taken in each episode, (insect,), which this function increments, and the steps of an episode.
+        result: rewards, falls and reached time limits, each (insect,); zeros, into which this function writes.
 
     Returns:
         Whether any episode has ended.
@@ -177,12 +179,12 @@ def judge(places: Any, ids: Any, sensors: Any, trunk: Any, command: float, time:
                 fell[n] |= sensors[i, t, column] > 0
         over[n] = done[n] == steps and not fell[n]
         if not fell[n]:
-            reward[n] = worth(qvel[n], rotation[n], command)
+            reward[n] = step_reward(qvel[n], rotation[n], command)
         ended |= fell[n] or over[n]
     return ended
 
 
 @jitted
-def worth(qvel: Any, rotation: Any, command: float) -> float:
-    """Return the reward of a step without a fall, max(0, 1 - |v - c| / c) max(0, u), of one insect in its state now."""
+def step_reward(qvel: Any, rotation: Any, command: float) -> float:
+    """Return the reward of a step without a fall, from the state after the step; `task` explains the formula."""
     return max(1.0 - abs(qvel[0] - command) / command, 0.0) * max(rotation[2, 2], 0.0)

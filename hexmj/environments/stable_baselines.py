@@ -1,7 +1,7 @@
-"""Many insects for stable-baselines3, whose vector environments differ from Gymnasium's.
+"""Many insects as a vector environment of stable-baselines3, whose interface differs from Gymnasium's.
 
-An agent observes the sensed numbers of `learned.felt_in` in single precision, so that its policy walks as a controller
-by `learned.WithOffsets`. `HeldInsects` are insects whose actions last for many steps.
+An agent observes the sensed numbers of `learned.felt_in` in single precision, so that `learned.WithOffsets` can make a
+controller of its policy. The wrapper `HeldInsects` holds each action for many steps.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,25 +23,25 @@ from hexmj.environments.vector import StickInsects
 from hexmj.validate import whole
 
 Moves = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Actions, (n, number), and sensed numbers, (n, `FELT`) -> offsets of the tips, (n, leg * axis)."""
+"""Function of actions, (n, number), and sensed numbers, (n, `FELT`), that returns tip offsets, (n, leg * axis)."""
 
 Reward = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""The environment's reward, the sensed numbers at the end of a step and the falls, each (n, ...) -> the reward for
-learning, (n,)."""
+"""Function of the environment's reward, (n,), the sensed numbers after a step, (n, `FELT`), and the falls, (n,), that
+returns the reward for learning, (n,)."""
 
 
 class FeltInsects(VecEnv):
-    """Insects whose actions are offsets to the tips; an episode begins in the step in which the last one ends."""
+    """Insects whose actions are tip offsets; an insect's next episode begins in the step that ends its episode."""
 
     def __init__(self, num_envs: int, **task: Any) -> None:
-        """Make the insects of `vector.StickInsects` with the actions 'tips' and the mode 'SameStep'."""
+        """Make `num_envs` insects; `task` has further arguments of `vector.StickInsects`, such as velocity."""
         self._insects = StickInsects(num_envs, actions="tips", autoreset_mode="SameStep", **task)
         felt = spaces.Box(-MOST, MOST, (FELT,), np.float32)
         super().__init__(num_envs, felt, self._insects.single_action_space)  # pyright: ignore[reportArgumentType]
         self._actions: Any = None
 
     def reset(self) -> np.ndarray:
-        """Begin all episodes, with the seeds of `seed` if it was called."""
+        """Begin an episode of every insect, with the seeds set by the method `seed`, if any."""
         observed = self._insects.reset(seed=self._seeds)[0]
         self._reset_seeds()
         self._reset_options()
@@ -66,7 +66,7 @@ class FeltInsects(VecEnv):
         return self._seen(observed), reward.astype(np.float32), done, infos
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Return a frame of every insect, (height, width, 3), with `render_mode`."""
+        """Return an image of every insect, (height, width, 3), or None for each without a `render_mode`."""
         return self._insects.render() or [None] * self.num_envs
 
     def close(self) -> None:
@@ -74,26 +74,22 @@ class FeltInsects(VecEnv):
         self._insects.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute, which all insects share; spaces are those of one insect."""
+        """Return an attribute of the environment, once for each index; a space is that of a single insect."""
         owner = self if attr_name in ("action_space", "observation_space") else self._insects
         return [getattr(owner, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refuse to change an attribute.
-
-        Raises:
-            InputError: always.
-        """
-        raise InputError(f"{attr_name} cannot be set; make other insects")
+        """Raise InputError: attributes cannot be changed."""
+        raise InputError(f"{attr_name} cannot be set; make a new environment")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of all insects together."""
+        """Call a method of the whole environment; raise InputError if `indices` leave out insects."""
         if len(set(self._get_indices(indices))) < self.num_envs:
-            raise InputError(f"indices = {indices!r:.80}; expected all insects, which are one environment")
+            raise InputError(f"indices = {indices!r:.80}; expected all insects, because they are one environment")
         return [getattr(self._insects, method_name)(*args, **kwargs)] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """Return False: no single insect is wrapped."""
+        """Return False for each index, because no wrapper holds a single insect."""
         return [False] * len(list(self._get_indices(indices)))
 
     def _seen(self, observations: dict[str, np.ndarray]) -> np.ndarray:
@@ -101,24 +97,24 @@ class FeltInsects(VecEnv):
 
 
 class HeldInsects(VecEnvWrapper):
-    """Insects whose actions are a few parameters of reflexes, held for many steps; the reflexes act at each step.
+    """Wrapper in which an action is a few parameters of reflexes, held for many steps; reflexes act at each step.
 
-    The observation is constant, because the parameters themselves are learned. The reward is the mean reward of the
-    steps. An insect whose episode ends continues with a fresh episode, without rewards until the next action.
+    The observation is constant, because the agent learns only the parameters. The reward is the mean reward of the
+    steps. An insect whose episode ends begins a new episode, and earns no rewards until the next action.
     """
 
     def __init__(self, insects: FeltInsects, numbers: int, steps: int, moves: Moves, reward: Reward) -> None:
         """Wrap insects.
 
         Args:
-            insects: the insects.
-            numbers: parameters of an action, each from -1 to 1.
-            steps: steps for which an action is held.
-            moves: the reflexes.
-            reward: the reward of a step.
+            insects: the environment to wrap.
+            numbers: number of an action's parameters, each from -1 to 1.
+            steps: number of steps for which an action is held.
+            moves: the reflexes, a function of actions and sensed numbers.
+            reward: function that computes the reward of each step.
 
         Raises:
-            InputError: numbers or steps are not positive.
+            InputError: `numbers` or `steps` is less than 1.
         """
         self._shape = (whole("numbers", numbers, 1),)
         nothing = spaces.Box(0.0, 1.0, (1,), np.float32)
@@ -128,7 +124,7 @@ class HeldInsects(VecEnvWrapper):
         self._constant = np.ones((self.num_envs, 1), np.float32)
 
     def reset(self) -> np.ndarray:
-        """Begin all episodes."""
+        """Begin an episode of every insect."""
         self._felt = self._insects.reset()
         return self._constant
 
@@ -136,12 +132,12 @@ class HeldInsects(VecEnvWrapper):
         """Store the actions for `step_wait`.
 
         Raises:
-            InputError: the shape is another one, or a number is out of bounds.
+            InputError: the shape of the actions is wrong, or a number is out of its bounds.
         """
         self._actions = checked_actions(actions, (self.num_envs, *self._shape))
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Take all steps of one action.
+        """Take all steps of the stored actions.
 
         Raises:
             SimulationError: the simulation of an insect diverged.

@@ -1,34 +1,33 @@
-"""The task: what an episode, an action, an observation and a reward are, for every interface the same.
+"""The task: episodes, actions, observations and rewards, which all environments share.
 
 The insect should walk straight ahead at a commanded velocity. An episode begins at a random start in S, settled as for
-a physical walk. One step of an environment is one step of the plan, with its substeps. The controller runs along, and
-its plan is observed whatever the actions are. Actions are targets of all joints, held for the step ('joints'), or
-offsets to the tips that the controller plans ('tips'). Without offsets, the insect walks as in
+a physical walk. One step of an environment is one step of the plan, with its substeps. The controller plans every step,
+and its plan is observed with both kinds of actions. Actions are targets of all joints, held for the step ('joints'), or
+offsets to the tips that the controller plans ('tips'). With zero offsets, the insect walks as in
 `measures.physical.physical_walk`, bit for bit.
 
-Observations are float64 and clipped at their bounds (`observation_bounds`):
+Observations are float64 and clipped to their bounds (`observation_bounds`):
 
 - joint_angles, joint_velocities: (leg * joint,) [rad], [rad/s], in the order of `ctrl`
 - orientation: unit quaternion of the root, (w, x, y, z); the commanded direction is the world's x
-- velocity: of the root, ahead, to the left and up, relative to its heading [mm/s]
-- angular_velocity: of the root, in its own frame [rad/s]
+- velocity: velocity of the root, (3,) [mm/s]: along its heading, to the left of it, and up
+- angular_velocity: angular velocity of the root, in the root frame, (3,) [rad/s]
 - clearance: height of the trunk's lowest point, (1,) [mm]
-- tips: in the root frame, (leg, axis) [mm]
-- contact: (leg,) 1 where the ground carried the foot within the last `Conditions.contact_gap`, at the beginning of the
-  last physics step
-- margin: measured stability margin, (1,) [mm], of the feet in contact and the insect's own centre of mass;
-  `Lengths.no_foot_margin`, which is out of any foot's reach, where no foot is in contact
+- tips: measured tips in the root frame, (leg, axis) [mm]
+- contact: (leg,) 1 for feet that the ground carried at the beginning of the last physics step, or less than
+  `Conditions.contact_gap` before it
+- margin: measured stability margin, (1,) [mm], of the feet in contact and the insect's own centre of mass; if no foot
+  is in contact, `Lengths.no_foot_margin`, which is farther than any foot reaches
 - command: commanded velocity, (1,) [mm/s]
-- planned_stance: (leg,) 1 where the plan lets the leg stand
-- planned_tips: in the root frame, (leg, axis) [mm], without offsets
-- out_of_reach, with 'tips' only: (leg,) substeps of the last step in which the leg kept its last angles, because its
-  planned tip with the offset was out of reach
+- planned_stance: (leg,) 1 for legs that the plan puts in stance
+- planned_tips: planned tips in the root frame, without offsets, (leg, axis) [mm]
+- out_of_reach, with 'tips' only: (leg,) number of substeps of the last step in which the leg kept its joint angles,
+  because its planned tip plus the offset was out of reach
 
 The reward of a step is max(0, 1 - |v - c| / c) max(0, u), with the velocity v along the world's x after the step, the
-command c and the upward component u of the body's vertical; it is 0 on a fall. An episode is terminated by a fall: the
-trunk touches the ground. It is truncated after its duration, or where a foot reaches the end of a step, gap or hurdle.
-
-`observing` computes all of this.
+command c and the upward component u of the body's vertical axis; it is 0 if the insect falls. A fall terminates an
+episode: the trunk touches the ground. The end of the duration truncates it, and so does a foot that reaches the end of
+a step, gap or hurdle. The module `observing` computes observations, rewards and falls.
 """
 
 from dataclasses import dataclass, field
@@ -46,58 +45,58 @@ from hexmj.timing import Stride, steps_within
 from hexmj.validate import choice, number
 
 Actions = Literal["joints", "tips"]
-"""Kinds of actions: targets of the joints, or offsets to the tips."""
+"""Kinds of actions: 'joints' are targets of the joints, 'tips' are offsets to the planned tips."""
 
 ROUNDING = 1e-6
-"""Tolerance of an action's bounds: a bound that was rounded to single precision is allowed."""
+"""Tolerance of an action's bounds, so that bounds rounded to single precision are allowed."""
 
 BEYOND_RANGE = 0.5
-"""Angle by which observed joints may exceed their ranges, whose limits are soft [rad]."""
+"""Angle by which observed joint angles may exceed the joints' ranges, because MuJoCo's limits are soft [rad]."""
 
 FASTEST_TURN = 200.0
-"""Greatest observed velocity of a joint, and of the root about an axis [rad/s]."""
+"""Bound of the observed velocity of a joint, and of the angular velocity of the root about an axis [rad/s]."""
 
 FASTEST = 20.0
-"""Greatest observed velocity of the root, as a height of free fall in standing heights h: sqrt(2 g h) for each."""
+"""Bound of the observed velocity of the root, as the height of free fall that reaches it [standing heights]."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """The settings of an episode.
+    """The settings of episodes.
 
     Raises:
-        InputError: a value is out of its range.
+        InputError: a field is out of its range.
     """
 
     velocity: float = 0.3
     """Commanded V_r, 0 < V < 1, as a fraction of V_p."""
     actions: Actions = "joints"
-    """Kind of actions."""
+    """Kind of actions: 'joints' or 'tips'."""
     controller: Controller = LDVS
     """Controller that plans the walk."""
     conditions: Conditions = field(default_factory=Conditions)
-    """Conditions of the walk."""
+    """Conditions of the physical walk, such as V_p, body and ground."""
     stride: Stride = field(default_factory=Stride)
-    """Stride of the plan; its time step is that of the environment."""
+    """Step range and time step of the plan; one time step is one step of the environment."""
     duration: float = 200.0
-    """Duration of an episode [time units]."""
+    """Largest duration of an episode, which ends earlier if the insect falls [time units]."""
 
     def __post_init__(self) -> None:
         choice("actions", self.actions, ("joints", "tips"))
         if not 0 < number("velocity", self.velocity) < 1:
-            raise InputError(f"velocity = {self.velocity}; expected 0 < V < 1, a fraction of V_p")
+            raise InputError(f"velocity = {self.velocity}; expected a fraction of V_p, 0 < V < 1")
         check_controller_type(self.controller)
         check_ground(self.conditions)
         steps_within(self.duration, self.stride)
 
     @property
     def steps(self) -> int:
-        """Steps of an episode."""
+        """Largest number of steps of an episode."""
         return int(steps_within(self.duration, self.stride))
 
     @property
     def substeps(self) -> int:
-        """Physics steps in one step."""
+        """Number of physics steps in one step of the environment."""
         return self.conditions.substeps(self.stride)
 
     @property
@@ -107,7 +106,7 @@ class Task:
 
 
 def observation_bounds(compiled: CompiledBody, task: Task) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return the least and the greatest value of every observation, in its shape, by name and in order."""
+    """Return the smallest and largest value of each observation by name, two arrays in the observation's shape."""
     lengths, ranges = compiled.body.lengths, compiled.model.actuator_ctrlrange[compiled.columns.ctrl]
     far, tall = -lengths.no_foot_margin, compiled.body.standing_height
     fastest = np.sqrt(2.0 * compiled.weight / compiled.body.mass * FASTEST * tall)
@@ -132,15 +131,15 @@ def observation_bounds(compiled: CompiledBody, task: Task) -> dict[str, tuple[np
 
 
 def action_names(compiled: CompiledBody, task: Task) -> tuple[str, ...]:
-    """Return the names of an action's numbers."""
+    """Return the names of an action's numbers, such as the joints' names or 'L1_forward', (number,)."""
     if task.actions == "joints":
         return compiled.body.joints
     return tuple(f"{leg}_{axis}" for leg in LEGS for axis in ("forward", "left", "up"))
 
 
 def action_bounds(compiled: CompiledBody, task: Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the least, the usual and the greatest action, (number,): joint targets [rad], of which the home posture is
-    usual, or offsets of the tips [mm], of which 0 is usual."""
+    """Return the smallest, the default and the largest action, (number,) each: joint targets [rad], by default the home
+    posture, or tip offsets [mm], by default 0."""
     if task.actions == "joints":
         low, high = compiled.model.actuator_ctrlrange[compiled.columns.ctrl].T
         return low, compiled.home[compiled.columns.qpos], high
@@ -151,19 +150,19 @@ def action_bounds(compiled: CompiledBody, task: Task) -> tuple[np.ndarray, np.nd
 def checked_actions(
     actions: Any, shape: tuple[int, ...] | None, low: np.ndarray | float = -1.0, high: np.ndarray | float = 1.0
 ) -> np.ndarray:
-    """Return actions as floats in their shape, within their bounds except for `ROUNDING`.
+    """Return actions as an array of floats, after a check of its shape and bounds with the tolerance `ROUNDING`.
 
     Raises:
-        InputError: the shape is another one, or a number is out of its bounds.
+        InputError: the shape of the actions is wrong, or a number is out of its bounds.
     """
     actions = np.asarray(actions, dtype=float)
     if actions.shape != shape:
-        raise InputError(f"an action has the shape {actions.shape}; expected {shape}")
+        raise InputError(f"the action has the shape {actions.shape}; expected {shape}")
     if not (within := (actions >= low - ROUNDING) & (actions <= high + ROUNDING)).all():
-        raise InputError(f"an action has {actions[~within][0]}, which is out of its bounds")
+        raise InputError(f"the action has {actions[~within][0]}, which is out of the action space")
     return actions
 
 
 def draw_start(rng: np.random.Generator, task: Task) -> np.ndarray:
-    """Draw the next start of one insect, (1, leg) [mm]; with the same seed as `draw_starts`, the same starts."""
+    """Draw the next start of one insect, (1, leg) [mm]. Equal seeds give the same sequence as `draw_starts`."""
     return rng.uniform(task.stride.pep0, task.stride.aep0, (1, 6))

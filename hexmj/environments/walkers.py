@@ -1,8 +1,8 @@
-"""Insects that take actions, each in an episode of its own; every interface of this package is built on `Walkers`.
+"""Insects that take actions, each in its own episode; every interface of this package is built on `Walkers`.
 
-Insects that begin together are the starts of one plan. A plan without sensory feedback is asked for many steps at once;
-a plan with sensory feedback receives the state of the legs before each step. An insect is independent of all others:
-its walk depends neither on their number nor on the insects that began with it.
+Insects that begin at the same step form a group, whose starts are those of one plan. A plan without sensory feedback
+plans many steps at once. A plan with sensory feedback receives the sensed legs before each step. The walk of an insect
+depends neither on the number of insects nor on its group.
 """
 
 from copy import copy
@@ -15,9 +15,10 @@ import numpy as np
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
 from hexmj.bodies.kinematics import standing_tips
-from hexmj.controllers.planning import advanced, begin
+from hexmj.controllers.planning import advanced
+from hexmj.controllers.planning import begin as begin_plan
 from hexmj.controllers.protocol import FeedbackPlan, Plan
-from hexmj.environments.observing import Observer, Places, Planned, judge, order
+from hexmj.environments.observing import Observer, Places, Planned, end_step, next_targets
 from hexmj.environments.task import Task, action_bounds
 from hexmj.errors import InputError
 from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, walk_error
@@ -26,86 +27,86 @@ from hexmj.physics.rollout import Senses
 from hexmj.physics.settle import Settling
 from hexmj.physics.substeps import FineSteps, Shown, allowed_depth, strikes
 
-AHEAD = 128
-"""Steps planned at once without sensory feedback."""
+STEPS_AHEAD = 128
+"""Number of steps that a plan without sensory feedback plans at once."""
 
 Bodies = Union["Alone", MujocoBatch]
-"""Engine of the insects, which shows their places and puts them into a state."""
+"""Engine that steps the insects: `Alone` for one insect, `MujocoBatch` for many."""
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-"""The whole state before a step, with the time."""
+"""MuJoCo's state elements that `Alone` stores before a step: all that determine the step, and the time."""
 
 
 class Acted(NamedTuple):
-    """The result of a step, each (n,)."""
+    """Result of a step for every insect."""
 
     reward: np.ndarray
-    """0 for insects that did not walk."""
+    """(insect,) reward of the step; 0 for insects whose episode was already over."""
     terminated: np.ndarray
-    """Whether the insect fell."""
+    """(insect,) whether the insect fell in this step."""
     truncated: np.ndarray
-    """Whether its time or the ground ended."""
+    """(insect,) whether this step reached the time limit or the end of the ground without a fall."""
 
 
 @dataclass(eq=False)
-class Together:
-    """Insects that began together, and their plan."""
+class Group:
+    """Insects whose episodes began at the same step, and their plan."""
 
     ids: np.ndarray
-    """(n,) insects that still walk."""
+    """(n,) indices of the insects of the group that still walk."""
     rows: np.ndarray
-    """(n,) their rows among the plan's starts."""
+    """(n,) rows of these insects among the plan's starts."""
     plan: Plan
-    """The plan of all that began."""
+    """Plan of all insects of the group, also of those whose episodes have ended."""
     targets: TipTargets
-    """The tip targets of all that began."""
+    """Tip targets of all insects of the group, also of those whose episodes have ended."""
     ahead: int = 0
-    """Planned steps that are not walked yet."""
+    """Number of planned steps that the group has not walked yet."""
 
 
 class Walkers:
-    """Insects, each in an episode of its own."""
+    """Insects that take actions, each in its own episode."""
 
     def __init__(self, task: Task, compiled: CompiledBody, bodies: Bodies, count: int, threads: int | None) -> None:
-        """Prepare `count` insects. `threads` settle them, by default one per core."""
+        """Prepare `count` insects, which `threads` threads settle at their starts, by default one per core."""
         self._task, self._compiled, self._threads = task, compiled, threads
         self._settling = Settling(task.conditions, task.stride, threads)
         self._steps, self._substeps = task.steps, task.substeps
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self.begun = False
-        """Whether steps may follow: all have begun, and no step or reset has failed since."""
-        self._together: list[Together] = []
-        tips, stance = np.empty((count, AHEAD, task.substeps, 6, 3)), np.empty((count, AHEAD, 6), bool)
-        self._ahead = tips, stance, np.zeros(count, dtype=int)  # plans, and the index of the next step
+        """Whether a step is allowed: all insects have begun, and no step or reset has failed since."""
+        self._groups: list[Group] = []
+        tips, stance = np.empty((count, STEPS_AHEAD, task.substeps, 6, 3)), np.empty((count, STEPS_AHEAD, 6), bool)
+        self._ahead = tips, stance, np.zeros(count, dtype=int)  # tips, stance, index of the next step
         self._joints = np.empty((count, 6, compiled.joints // 6))
         self._planned = Planned(np.ones((count, 6)), np.empty((count, 6, 3)), np.zeros((count, 6)))
-        low, self._usual, high = action_bounds(compiled, task)
-        self._below, self._above = self._usual - low, high - self._usual
+        low, self._default, high = action_bounds(compiled, task)
+        self._below, self._above = self._default - low, high - self._default
         self.observer = Observer(compiled, task)
-        self.look(bodies)
+        self.bind(bodies)
 
-    def look(self, bodies: Bodies) -> None:
-        """Refer to the arrays of these bodies, which change with each step."""
+    def bind(self, bodies: Bodies) -> None:
+        """Step these bodies from now on, and refer to the arrays that hold their current states."""
         self.bodies, self.places = bodies, Places(bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors)
-        self._passed = tuple(self.places), tuple(self._planned)  # compiled code receives plain tuples faster
+        self._passed = tuple(self.places), tuple(self._planned)  # numba unpacks plain tuples faster
         self._take = (
             bodies.take if isinstance(bodies, Alone) else FineSteps.of(bodies, self._substeps, self._compiled).take
         )
 
     def begin(self, ids: np.ndarray, starts: np.ndarray) -> None:
-        """Begin episodes of some insects, (n,), at starts, (n, leg) [mm]; the first call is for all insects.
+        """Begin episodes of the insects `ids`, (n,), at starts, (n, leg) [mm]. The first call must begin all insects.
 
         Raises:
-            SimulationError: a start does not settle.
+            SimulationError: an insect does not come to rest at its start.
         """
-        task, self.begun = self._task, False  # stays if a start does not settle
+        task, self.begun = self._task, False  # remains False if a start does not settle
         settled = self._settling.at(starts, ids)
-        plan = begin(task.controller, starts, task.velocity, task.stride, threads=self._threads)
+        plan = begin_plan(task.controller, starts, task.velocity, task.stride, threads=self._threads)
         check_made_for(plan, task.conditions)
         self._leave(ids)
         targets = TipTargets(settled.starts, task.conditions, task.stride)
-        self._together.append(Together(ids, np.arange(len(ids)), plan, targets))
+        self._groups.append(Group(ids, np.arange(len(ids)), plan, targets))
         self.bodies.stand(ids, settled.state, settled.ctrl)
         if len(ids) == self._count:
             self._senses = Senses(settled)
@@ -119,20 +120,20 @@ class Walkers:
         self._ids, self.begun = np.flatnonzero(self._walking), True
 
     def act(self, actions: np.ndarray) -> Acted:
-        """Take one step of all insects that walk.
+        """Take one step of all insects whose episodes are not over.
 
         Args:
-            actions: of every insect, (insect, number): 0 is the usual action, -1 the least and 1 the greatest.
+            actions: normalised actions, (insect, number): 0 is the default, -1 the smallest and 1 the largest action.
 
         Raises:
-            InputError: no episode has begun, or a plan is invalid.
+            InputError: no episode has begun, a step or reset has failed, or a plan is invalid.
             SimulationError: the simulation of an insect diverged.
         """
         self.check_begun()
         if self.over:
             return self._nothing()
         actions = actions[self._ids]
-        control = self.control(self._usual + actions * np.where(actions > 0, self._above, self._below))
+        control = self.control(self._default + actions * np.where(actions > 0, self._above, self._below))
         try:
             return self.judge(self._take(self._ids, control))
         except Diverged as error:
@@ -146,20 +147,20 @@ class Walkers:
 
     @property
     def over(self) -> bool:
-        """Whether all episodes that have begun are over."""
+        """Whether all insects have begun and all their episodes are over."""
         return self.begun and len(self._ids) == 0
 
-    def control(self, wanted: np.ndarray) -> np.ndarray:
-        """Return the controls of the insects that walk for a step, (n, substep, actuator); `judge` ends the step.
+    def control(self, actions: np.ndarray) -> np.ndarray:
+        """Return the controls of one step, (n, substep, actuator), for the n insects that walk; then call `judge`.
 
         Args:
-            wanted: values of their actions, (n, number) [rad] or [mm].
+            actions: joint targets [rad] or tip offsets [mm] of the insects that walk, (n, number).
         """
-        self.begun = False  # if the step fails, the other insects may have taken it or not
-        for group in self._together:
+        self.begun = False  # remains False if the step fails, because only some insects may have taken it
+        for group in self._groups:
             self._plan(group)
         ids, substeps, offset = self._ids, self._substeps, self._task.actions == "tips"
-        tips = order(wanted, ids, self._ahead, self._passed[1], offset)
+        tips = next_targets(actions, ids, self._ahead, self._passed[1], offset)
         if offset:
             joints, reachable = self._compiled.inverse(tips)
             if not reachable.all():
@@ -168,18 +169,18 @@ class Walkers:
             self._joints[ids] = joints[:, -1]
             control = joints.reshape(len(ids), substeps, -1)
         else:
-            control = wanted[:, np.newaxis].repeat(substeps, axis=1)
+            control = actions[:, np.newaxis].repeat(substeps, axis=1)
         if self._task.conditions.grasp:
             stance = self._planned.stance[ids, np.newaxis]
             control = np.concatenate([control, stance.repeat(substeps, axis=1)], axis=2)
         return control
 
     def judge(self, shown: Shown) -> Acted:
-        """Return the result of a step, from its sensors and forces, (n, substep, ...)."""
+        """Return the result of a step from its record, (n, substep, ...), and end the episodes that are over."""
         ids, acted, columns = self._ids, self._nothing(), self._compiled.columns
         self._senses.feel(ids, shown["sensors"], shown["force"])
         trunk, time = (columns.trunk.start, columns.trunk.stop), (self._done, self._steps)
-        ended = judge(self._passed[0], ids, shown["sensors"], trunk, self._task.command, time, tuple(acted))
+        ended = end_step(self._passed[0], ids, shown["sensors"], trunk, self._task.command, time, tuple(acted))
         if self._task.conditions.ground in WITH_ENDS:
             feet = self.places.sensors[ids, columns.foot].reshape(-1, 6, 3)
             beyond = beyond_the_ground(self._task.conditions, feet).any(axis=1)
@@ -191,23 +192,23 @@ class Walkers:
         return acted
 
     def observations(self) -> np.ndarray:
-        """Return the observations of all insects, (insect, number); `observer.named` names them."""
+        """Return the observations of all insects, (insect, number); `observer.named` splits them by name."""
         places, planned = self._passed
         return self.observer.observe(places, self._senses.standing(), planned)
 
     def _leave(self, ids: np.ndarray) -> None:
-        """End the episodes of some insects."""
+        """End the episodes of the insects `ids`, (n,)."""
         self._walking[ids] = False
         self._ids = np.flatnonzero(self._walking)
-        for group in self._together:
+        for group in self._groups:
             still = self._walking[group.ids]
             group.ids, group.rows = group.ids[still], group.rows[still]
-        self._together = [group for group in self._together if len(group.ids)]
+        self._groups = [group for group in self._groups if len(group.ids)]
 
-    def _plan(self, group: Together) -> None:
-        """Plan the next steps of a group that has none left, and take one of them."""
+    def _plan(self, group: Group) -> None:
+        """Count one planned step of a group as walked; before that, plan further steps if none is left."""
         if group.ahead == 0:
-            ids, steps = group.ids, min(AHEAD, self._steps - group.plan.done)
+            ids, steps = group.ids, min(STEPS_AHEAD, self._steps - group.plan.done)
             if isinstance(group.plan, FeedbackPlan):
                 sensed = self._senses.sensed(ids, self.places.qpos[ids], self.places.qvel[ids])
                 group.plan.sense(replace(sensed, ids=group.rows.copy()))
@@ -220,18 +221,18 @@ class Walkers:
         group.ahead -= 1
 
     def _nothing(self) -> Acted:
-        """Return an empty result."""
+        """Return the result of a step in which no insect walks: zeros and False."""
         return Acted(np.zeros(self._count), *np.zeros((2, self._count), dtype=bool))
 
 
 class Alone:
-    """An `Engine` of one body, bit for bit as `physics.engine.MujocoBatch`; every `ids` is [0].
+    """An `Engine` of one body, which walks bit for bit as in `physics.engine.MujocoBatch`. `ids` must always be [0].
 
-    Between two steps, the first half of the next step is done already, so that places are current.
+    Each step ends with MuJoCo's mj_step1, the first half of the next step, so that positions of feet are current.
     """
 
     def __init__(self, compiled: CompiledBody, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Wrap a model and its data, which may be read and changed from outside."""
+        """Wrap a model and its data, which the caller may read and change between steps."""
         self.model, self.data, self._foot = model, data, compiled.columns.foot
         self._compiled, self._allowed = compiled, allowed_depth(compiled)
         self.qpos, self.qvel = data.qpos[np.newaxis], data.qvel[np.newaxis]
@@ -241,19 +242,19 @@ class Alone:
         self._warned, self._size = data.warning.number, mujoco.mj_stateSize(model, _STATE)
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
-        """Put the body into a state, see `engine.Engine.put`."""
+        """Set the state of the body, `states` (1, state), see `engine.Engine.put`."""
         mujoco.mj_setState(self.model, self.data, states[0], _STATE)
         mujoco.mj_step1(self.model, self.data)
 
     def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
-        """Put the body into a state at rest, (1, state), with its controls, (1, actuator)."""
+        """Reset the body to a settled state, `states` (1, state), with its controls, (1, actuator)."""
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, states[0], STATE_BITS)
         self._control[:] = control[0]
         mujoco.mj_step1(self.model, self.data)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """Take one step of the plan; only if a foot strikes the ground, by `substeps.FineSteps.take`."""
+        """Take one step of the plan; for speed, use the slower `FineSteps.take` only if a foot strikes the ground."""
         rolled = self.roll(ids, control, 1)
         if not np.count_nonzero(strikes(self._compiled.depth(rolled.feet), control.shape[1], self._allowed)):
             return {"sensors": rolled.sensors, "force": rolled.force}
@@ -261,21 +262,21 @@ class Alone:
         return FineSteps.of(self, control.shape[1], self._compiled).take(ids, control)
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
-        """Take substeps, see `engine.Engine.roll`; neither torques nor states are stored."""
+        """Take substeps, see `engine.Engine.roll`; the record has neither torques nor states."""
         model, data, count = self.model, self.data, control.shape[1]
         before, nothing = np.empty((1, self._size)), np.empty((1, count, 0))
         sensors = np.empty((1, count + 1, len(self._sensors)))
         force = np.empty((1, count, len(self._force)))
         mujoco.mj_getState(model, data, before[0], _STATE)
         if parts > 1:
-            model = copy(model)  # another thread may step with the model
+            model = copy(model)  # another thread may use the model
             model.opt.timestep /= parts
             model.pair_solref[:, 0] = 2 * model.opt.timestep
             mujoco.mj_step1(model, data)
         for k in range(count):
             self._control[:] = control[0, k]
             (mujoco.mj_step if k else mujoco.mj_step2)(model, data)
-            sensors[0, k], force[0, k] = self._sensors, self._force  # places at the beginning of the step
+            sensors[0, k], force[0, k] = self._sensors, self._force  # positions are those before the substep
         mujoco.mj_step1(self.model, data)
         if np.count_nonzero(self._warned):
             raise self._diverged(before[0])
@@ -284,7 +285,7 @@ class Alone:
         return Rolled(before, feet, sensors[:, :count], force, torque=nothing, after=nothing)
 
     def _diverged(self, state: np.ndarray) -> Diverged:
-        """Return the error, with the state before."""
+        """Return the error of a diverged simulation, with the state before these substeps, (state,)."""
         kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
         before = mujoco.MjData(self.model)
         mujoco.mj_setState(self.model, before, state, _STATE)

@@ -1,1 +1,1 @@
-"""The paper's Section 5: claims, rules, measurements, figures."""
+"""Reproduction of the paper's Sections 5 and 6: claims, the rules that judge them, measurements, figures."""

@@ -1,4 +1,4 @@
-"""The paper's claims, from the table of data `claims.toml`, and the rules by which they are judged."""
+"""The paper's claims, read from `claims.toml`, and the rules that judge them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from hexmj.files import read_toml
 from hexmj.paper.quantities import QUANTITIES, Estimate, Measured, Point, Quantity
 from hexmj.timing import OBSERVATION_TIMES
 
-TABLE = Path(__file__).with_name("claims.toml")
+TABLE = Path(__file__).with_name("claims.toml")  # all claims
 
 LEVEL = 0.05
-"""Probability below which two counts are not of one frequency."""
+"""Significance level: two counts differ if p of Fisher's exact test is smaller."""
 
 END = 0.05
-"""A range of velocities is covered if its ends are met this closely."""
+"""Tolerance [V_p] within which measured velocities must reach both ends of a rule's range."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Our value with its 95 % interval, at the point that strains a rule most."""
+    """Our value, 95 % interval and verdict at the point that is farthest from agreeing with a rule."""
 
     value: float
     low: float
@@ -35,50 +35,50 @@ class Answer:
 
 @dataclass(frozen=True)
 class Rule:
-    """Base of the rules: a quantity over a range of velocities, whose ends must be measured."""
+    """Base class of rules: they judge a quantity over a range of velocities, whose ends must be measured."""
 
     quantity: Quantity
     velocities: tuple[float, float]
 
     @property
     def words(self) -> str:
-        """The rule in words."""
+        """Text of the rule for the table of claims."""
         raise NotImplementedError
 
     def judged(self, points: list[Point]) -> Answer:
-        """Judge the points of the range."""
+        """Return the answer of the rule to the points in its range of velocities."""
         raise NotImplementedError
 
     @property
     def span(self) -> str:
-        """The velocities in words."""
+        """Text of the velocities, such as 'V in [0.1, 0.3]'."""
         low, high = self.velocities
         return f"V = {low:g}" if low == high else f"V in [{low:g}, {high:g}]"
 
     def answer(self, measured: Measured, observation_time: str) -> Answer | None:
-        """Judge the quantity; None if a weight set has not been searched yet."""
+        """Return the answer of the rule to measurements; None if a weight set has not been searched yet."""
         low, high = self.velocities
         points = self.quantity.points(measured, observation_time)
         inside = [point for point in points if low - 1e-9 <= point.velocity <= high + 1e-9]
-        met = [point.velocity for point in inside]
-        if not met or min(met) > low + END + 1e-9 or max(met) < high - END - 1e-9:
+        found = [point.velocity for point in inside]
+        if not found or min(found) > low + END + 1e-9 or max(found) < high - END - 1e-9:
             return None
         return self.judged(inside)
 
 
 @dataclass(frozen=True)
 class Band(Rule):
-    """Agrees if, at every velocity of a range, the interval of a quantity reaches into a band."""
+    """Agrees if the 95 % interval of a quantity overlaps a band at every velocity of a range."""
 
     least: float = -np.inf
     most: float = np.inf
     over: Literal["each", "mean", "changes"] = "each"
-    """Judge each velocity; the mean over the range, J_N of Eq. 10 with velocities on a grid; or the changes from each
-    velocity to the next, which rise (least = 0) or sink (most = 0)."""
+    """What the rule judges: the value at each velocity; the mean over the range, J_N of Eq. 10 on a grid of velocities;
+    or the changes from each velocity to the next (least = 0: they must rise, most = 0: they must fall)."""
 
     @property
     def words(self) -> str:
-        """The rule in words."""
+        """Text of the rule for the table of claims."""
         if self.over == "changes":
             change = f"from each V to the next, over {self.span}, the 95 % interval of the change of"
             return f"{change} {self.quantity.words} reaches {'above' if self.least == 0 else 'below'} 0"
@@ -94,7 +94,7 @@ class Band(Rule):
         return f"{at} the 95 % interval of {self.quantity.words} {band}"
 
     def judged(self, points: list[Point]) -> Answer:
-        """Judge the points, their mean or their changes."""
+        """Return the answer to the points, their mean or their changes, as `over` says."""
         if self.over == "mean":
             of_each_start = np.mean([point.values for point in points], axis=0)
             points = [Point(points[0].velocity, f"mean to {points[-1].velocity:g}", of_each_start)]
@@ -102,65 +102,65 @@ class Band(Rule):
         if self.over == "changes":
             names = dict.fromkeys(point.of for point in points)
             series = ([point for point in points if point.of == name] for name in names)
-            estimates = [_change(*both) for one in series for both in pairwise(one)]
-        strain = [max(one.value - self.most, self.least - one.value) for one in estimates]
-        return _worst(estimates, strain, all(one.low <= self.most and one.high >= self.least for one in estimates))
+            estimates = [_change(*both) for pair in series for both in pairwise(pair)]
+        excess = [max(item.value - self.most, self.least - item.value) for item in estimates]
+        return _worst(estimates, excess, all(item.low <= self.most and item.high >= self.least for item in estimates))
 
 
 @dataclass(frozen=True)
 class Seen(Rule):
-    """Agrees if, at every velocity of a range, our count and that of the paper's own sample may have one frequency.
+    """Agrees if Fisher's exact test finds no difference between our count and the paper's at every velocity.
 
-    Fisher's exact test, two-sided, at 5 %, holds for rare events and small samples too.
+    The two-sided test at the 5 % level is also valid for rare events and small samples.
     """
 
     count: int
-    """Number of starts in which the paper saw it."""
+    """Number of the paper's starts in which the event of the quantity occurred."""
     of: int
-    """Number of all starts of the paper."""
+    """Number of all starts in the paper's sample."""
 
     @property
     def words(self) -> str:
-        """The rule in words."""
+        """Text of the rule for the table of claims."""
         return (
             f"at {self.span} Fisher's test does not tell the {self.quantity.words} from {self.count} of"
             f" {self.of} starts, the paper's own sample (p >= {LEVEL:g})"
         )
 
     def judged(self, points: list[Point]) -> Answer:
-        """Judge the counts."""
-        p = [fisher(int(one.values.sum()), len(one.values), self.count, self.of) for one in points]
+        """Return the answer to the counts of our starts."""
+        p = [fisher(int(item.values.sum()), len(item.values), self.count, self.of) for item in points]
         estimates = [point.estimate for point in points]
-        off = [abs(one.value - self.count / self.of) for one in estimates]
+        off = [abs(item.value - self.count / self.of) for item in estimates]
         return _worst(estimates, [(a < LEVEL) + b for a, b in zip(p, off, strict=True)], min(p) >= LEVEL)
 
 
 def fisher(count: int, size: int, other: int, of: int) -> float:
-    """Return p of Fisher's exact test, two-sided, of `count` in `size` against `other` in `of`; 0 without starts."""
+    """Return p of Fisher's two-sided exact test that compares `count` of `size` with `other` of `of`; 0 if size = 0."""
     from scipy.stats import fisher_exact
 
     return float(fisher_exact([[count, size - count], [other, of - other]]).pvalue) if size else 0.0
 
 
-def _worst(estimates: Sequence[Estimate], strain: Sequence[float], agrees: bool) -> Answer:
-    """Return the answer at the first estimate that strains the rule most."""
-    return Answer(*estimates[int(np.argmax(np.nan_to_num(strain, nan=np.inf)))], agrees)
+def _worst(estimates: Sequence[Estimate], excess: Sequence[float], agrees: bool) -> Answer:
+    """Return the answer at the first estimate with the largest `excess`, its distance from what the rule allows."""
+    return Answer(*estimates[int(np.argmax(np.nan_to_num(excess, nan=np.inf)))], agrees)
 
 
-def _change(one: Point, other: Point) -> Estimate:
-    """Return the change of the mean and its 95 % interval, as of independent samples."""
-    (a, a_low, a_high, where), (b, b_low, b_high, _) = one.estimate, other.estimate
+def _change(first: Point, second: Point) -> Estimate:
+    """Return the change of the mean between two points, with its 95 % interval for independent samples."""
+    (a, a_low, a_high, where), (b, b_low, b_high, _) = first.estimate, second.estimate
     below, above = float(np.hypot(b - b_low, a_high - a)), float(np.hypot(b_high - b, a - a_low))
-    return Estimate(b - a, b - a - below, b - a + above, f"{where} to {other.velocity:g}")
+    return Estimate(b - a, b - a - below, b - a + above, f"{where} to {second.velocity:g}")
 
 
 RULES: dict[str, Any] = {"band": Band, "seen": Seen}
-"""Classes by their kind in `claims.toml`."""
+"""Name of each kind of rule in `claims.toml` -> its class."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A number or statement of the paper; its fields are explained in `claims.toml`."""
+    """A number or statement of the paper; the head of `claims.toml` explains the fields."""
 
     key: str
     section: str
@@ -172,11 +172,11 @@ class Claim:
 
     @property
     def kind(self) -> str:
-        """'calibrated' if a constant was inferred from the claim's number, else 'held out'."""
+        """'calibrated' if a constant of hexmj was inferred from the claim's number, else 'held out'."""
         return "calibrated" if self.calibrates else "held out"
 
     def answers(self, measured: Measured) -> dict[str, Answer | None]:
-        """Return the answer under each observation time, or one answer under '' if it depends on none."""
+        """Return the answer for each observation time; gaits depend on none and have one answer with the key ''."""
         times = OBSERVATION_TIMES if self.rule.quantity.windowed else ("",)
         return {time: self.rule.answer(measured, time) for time in times}
 
@@ -189,7 +189,7 @@ def claims() -> dict[str, Claim]:
 
 @cache
 def in_physics() -> list[dict[str, str]]:
-    """Return topic, command and text of what only physical walks can answer."""
+    """Return topic, command and text of each statement that only physical walks can check."""
     return read_toml(TABLE)["in_physics"]
 
 

@@ -1,6 +1,6 @@
-"""Figures 2-6 in the paper's layout, the phase histograms of Section 5.3, and footfall diagrams over the velocity.
+"""Figures 2-6 in the paper's layout, phase histograms (Section 5.3), and footfall diagrams at several velocities.
 
-Each function takes measurements by name (`reproduce.measure`), and returns a figure and the data in it.
+Each function takes measurements by name, see `reproduce.measure`, and returns a figure and the data drawn in it.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Measurements = Mapping[str, "xr.Dataset"]
-"""Measurements by name, see `protocol.MEASUREMENTS`."""
+"""Name of each measurement, a key of `protocol.MEASUREMENTS` -> its data, with the axis `velocity`."""
 
 SAMPLES = 7
-"""Samples of starts whose means and standard deviations are drawn."""
+"""Number of samples of starts, whose mean FLSS and standard deviation are drawn."""
 
 BINS = 51
-"""Bins of a phase histogram; 0.5 is in the middle of one."""
+"""Number of bins of a phase histogram; it is odd, so that the phase 0.5 is in the middle of a bin."""
 
 RELATIVE = {2: "o", 3: "s"}
-"""Legs whose phases relative to leg 1 are drawn, with their symbols."""
+"""Legs whose phases relative to leg 1 are drawn -> their symbols."""
 
 UNCOORDINATED, HWS, LDVS, IDEAL, ACCELERATED = "#7a7a7a", "#1b6ca8", "#b3261e", "#111111", "#e08e1b"
 MODELS = {"hws": HWS, "ldvs": LDVS}
@@ -56,13 +56,13 @@ CURVES: dict[int, dict[str, tuple[str, dict[str, Any]]]] = {
         "ldvs accelerated": ("LDVS, accelerated", {"color": ACCELERATED, "marker": "*", "markersize": 9}),
     },
 }
-"""Number of a figure of FLSS -> its measurements, each with its label and the symbols of the paper."""
+"""Number of an FLSS figure -> names of its measurements -> label and line style, with the paper's symbols."""
 
 
 def phase_figure(measured: Measurements, model: str) -> "tuple[Figure, xr.Dataset]":
     """Draw the phases of legs 2 and 3 relative to leg 1: a dot for each stable gait, a line through the main peaks.
 
-    Crosses beside LDVS are Wilson's Gait II.
+    The figure of LDVS also shows the phases of Wilson's Gait II as crosses.
     """
     import xarray as xr
 
@@ -71,9 +71,9 @@ def phase_figure(measured: Measurements, model: str) -> "tuple[Figure, xr.Datase
     phase = np.full((len(RELATIVE), len(v), gaits.sizes["start"]), np.nan)  # (leg, velocity, start)
     peak = np.full((len(RELATIVE), len(v)), np.nan)
     for i, at in enumerate(v):
-        one = kept(gaits.sel(velocity=at)).phase
-        second = one.sel(pair="1-2").values
-        for row, values in enumerate((second, (second + one.sel(pair="2-3").values) % 1.0)):
+        phases = kept(gaits.sel(velocity=at)).phase
+        second = phases.sel(pair="1-2").values
+        for row, values in enumerate((second, (second + phases.sel(pair="2-3").values) % 1.0)):
             phase[row, i, : len(values)] = values
             if len(values):
                 peak[row, i] = circular_mean(values[main_peak(values)])
@@ -99,7 +99,7 @@ def phase_figure(measured: Measurements, model: str) -> "tuple[Figure, xr.Datase
 
 
 def phase_histograms(measured: Measurements, model: str) -> "tuple[Figure, xr.Dataset]":
-    """Draw the number of starts over their phase: a row for each pair of legs, a column for each of five velocities."""
+    """Draw histograms of the relative phases: a row for each pair of legs, a column for each of five velocities."""
     import xarray as xr
 
     gaits = measured[f"{model} gaits"]
@@ -125,7 +125,7 @@ def phase_histograms(measured: Measurements, model: str) -> "tuple[Figure, xr.Da
 
 
 def footfall_diagrams(measured: Measurements, model: str) -> "tuple[Figure, xr.Dataset]":
-    """Draw which legs protract (bars) in the steady-state gait, over three periods of a single leg."""
+    """Draw the protraction of each leg as bars over three periods of a single leg, for each velocity."""
     data = measured[f"{model} footfall"]
     figure = picture(7.2, 1.35 * data.sizes["velocity"] + 0.5)
     panels = figure.subplots(data.sizes["velocity"], 1, sharex=True, squeeze=False)[:, 0]
@@ -144,7 +144,7 @@ def footfall_diagrams(measured: Measurements, model: str) -> "tuple[Figure, xr.D
 
 
 def flss_figure(measured: Measurements, number: int, observation_time: str) -> "tuple[Figure, xr.Dataset]":
-    """Draw FLSS against velocity (Figs. 2-4): means of the samples of starts, bars of one standard deviation."""
+    """Draw FLSS against velocity (Figs. 2-4): means of `SAMPLES` samples of starts, with their standard deviations."""
     import xarray as xr
 
     figure, curves = picture(6.4, 4.6), CURVES[number]
@@ -167,7 +167,7 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
     return figure, data
 
 
-Draw = Callable[[Measurements], "tuple[Figure, xr.Dataset]"]
+Draw = Callable[[Measurements], "tuple[Figure, xr.Dataset]"]  # returns a figure and the data in it
 
 FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
     **{
@@ -183,4 +183,4 @@ FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
     **{f"phases-{model}": ((f"{model} gaits",), partial(phase_histograms, model=model)) for model in MODELS},
     **{f"footfall-{model}": ((f"{model} footfall",), partial(footfall_diagrams, model=model)) for model in MODELS},
 }
-"""Name of each figure -> the measurements it needs, and the function that draws it."""
+"""Name of each figure -> names of the measurements that it needs, and the function that draws it."""

@@ -1,8 +1,8 @@
-"""Measurements at one velocity: losses of stability, steady-state gaits and footfalls; losses after obstacles.
+"""Measurements at one velocity: losses of stability, also after obstacles, steady-state gaits, and footfalls.
 
-The outcome of every start is kept, so that curves can be compared on the same starts, and samples of 1000 formed later.
-Arguments have the same meaning in all functions: the velocity V_r as a fraction of V_p, the number and the seed of the
-starts, the stride, the procedure of Eq. 11, and threads, by default one per core.
+Results hold every single start, so that curves can be compared on the same starts and divided into samples later.
+All functions take the velocity V_r as a fraction of V_p, the seed and the number of the starts, the stride, the
+acceleration of Eq. 11 (None: V_r from time 0 on), and the number of threads, by default one per core.
 """
 
 from dataclasses import replace
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     import xarray as xr
 
 NO_SET = -1
-"""Outcome if no weight set has been searched yet."""
+"""Outcome of a start if the weight set has not been searched yet."""
 
 LATE_PERIODS = 5
-"""Periods of a single leg, (AEP_0 - PEP_0) (1 + 1/V), after which Section 5.2 counts losses again."""
+"""Number of periods of a single leg, (AEP_0 - PEP_0) (1 + 1/V), before late losses count (Section 5.2)."""
 
 MOMENTS = 1201
-"""Moments of a footfall diagram."""
+"""Number of equidistant times at which a footfall diagram shows the stance."""
 
 Answer = Literal["none", "positions", "postures", "slow down"]
-"""Answer to an obstacle: none; legs go to the nearest of a small set of positions of undisturbed walking and all stand
-there, or they take over the states of that posture too; or a superior level lowers V, and Eq. 11 raises it again."""
+"""Response to an obstacle (Section 6). 'positions': the tips go to the nearest posture of an undisturbed walk, and all
+legs stand; 'postures': the legs also take the states of that posture; 'slow down': V drops, and Eq. 11 raises it."""
 
 
 def losses(
@@ -49,17 +49,17 @@ def losses(
     late: bool = False,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Return which starts lose static stability, (observation time, start): 1 lost, 0 not, `NO_SET` without a set.
+    """Return whether each start loses stability, (observation time, start): 1 yes, 0 no, `NO_SET` without a weight set.
 
     Args:
-        sets: the network for each of `OBSERVATION_TIMES`.
-        late: count only losses after `LATE_PERIODS`.
+        sets: the network for each of `OBSERVATION_TIMES`; None if it has not been searched yet.
+        late: whether the observation time begins after `LATE_PERIODS` periods, instead of at time 0.
     """
     starts, at = draw_starts(n_starts, seed, stride), np.full(n_starts, velocity)
     lost = np.full((len(OBSERVATION_TIMES), n_starts), NO_SET, dtype=np.int8)
     unseen = int(steps_within(stride.periods(velocity, LATE_PERIODS), stride)) if late else 0
     for network in dict.fromkeys(filter(None, sets)):
-        rows = [row for row, other in enumerate(sets) if other == network]
+        rows = [row for row, candidate in enumerate(sets) if candidate == network]
         times = [observation_duration(OBSERVATION_TIMES[row], velocity, stride, acceleration) for row in rows]
         seen = steps_within(times, stride)
         plan, longest = network.begin(starts, at, stride, acceleration, threads), int(seen.max())
@@ -83,7 +83,7 @@ def limit_regimes(
     acceleration: Acceleration | None,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Return phases (start, pair), periods (start, leg) and properties of each start's steady-state gait."""
+    """Return phases (start, pair), periods (start, leg) and further properties of each start's steady-state gait."""
     import xarray as xr
 
     how: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
@@ -113,9 +113,9 @@ def footfalls(
     acceleration: Acceleration,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Return stance (time, leg) of one start over three periods of its steady-state gait.
+    """Return the stance, (time, leg), of one start in its steady-state gait, over three periods of a single leg.
 
-    Time is in periods of a single leg.
+    The unit of time is this period.
     """
     import xarray as xr
 
@@ -142,19 +142,19 @@ def losses_after(
     acceleration: Acceleration | None,
     threads: int | None = None,
 ) -> "xr.Dataset":
-    """Return which starts lose static stability after an obstacle, (observation time, start): 1 lost, 0 not.
+    """Return whether each start loses stability after an obstacle, (observation time, start): 1 yes, 0 no.
 
     An obstacle is "the termination of motion. Then the motion is initiated from new leg positions" (Section 6): a halt
-    in mid-stride. The observation time begins when the walk is at its velocity again.
+    in mid-stride. The observation time begins when the walk has reached its velocity again.
 
     Args:
         controller: a controller whose plans can be steered.
-        answer: to the obstacle.
-        n_starts: starts that reach it: the first of the seed's that are stable until then.
-        acceleration: Eq. 11 for the answer 'slow down'; None for others.
+        answer: response to the obstacle.
+        n_starts: number of starts that reach the obstacle: the first of the seed that are stable until then.
+        acceleration: Eq. 11 for the answer 'slow down'; None for other answers.
 
     Raises:
-        InputError: too few starts are stable so long, or none reaches a stable gait with postures.
+        InputError: too few starts are stable until the obstacle, or no start has a stable gait that provides postures.
     """
     stable = find_stable_starts(controller, velocity, n_starts, seed, stride, grid=1)
     halt = disturbance_of(stable, "halt", controller, velocity, stride)
@@ -165,7 +165,7 @@ def losses_after(
 
     ahead, plan = (begin(disturbed, stable.starts, velocity, stride, acceleration, threads) for _ in range(2))
     ahead.advance(int(halt.step.max()) + 1)
-    resumed: np.ndarray = ahead.resumed  # pyright: ignore[reportAttributeAccessIssue]  # a DisturbedPlan
+    resumed: np.ndarray = ahead.resumed  # pyright: ignore[reportAttributeAccessIssue]  # of DisturbedPlan
     back = resumed * stride.dt + (acceleration.duration(velocity) if acceleration else 0.0)
     steps = steps_within([back + observation_duration(time, velocity, stride) for time in OBSERVATION_TIMES], stride)
     first = planned_losses(plan, steps.max(axis=0), threads)

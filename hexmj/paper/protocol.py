@@ -1,4 +1,4 @@
-"""What Section 5 simulates: measurements, each of a few seconds at one velocity, from which the claims are judged."""
+"""The measurements of Sections 5 and 6, from which claims are judged, their numbers of starts and velocities."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -14,25 +14,25 @@ from hexmj.sweep import Cell
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
 from hexmj.validate import whole
 
-PRINTED = MODEL_VARIANTS["printed"]
+PRINTED = MODEL_VARIANTS["printed"]  # the rules as the paper prints them
 
 FOUND = Path(__file__).with_name("ideal.toml")
-"""Table of the weight sets that searches found."""
+"""File with the weight sets that searches found."""
 
 OWN = {variant: name for name, variant in MODEL_VARIANTS.items() if name != "printed"}
-"""Model variants under which our own presets were searched -> beginning of their names, instead of 'own'."""
+"""Model variant under which our own presets were searched -> prefix of their names, instead of 'own'."""
 
 RANGES = {"wide": (0.1, 0.7), "hws again": (0.1, 0.45), "ldvs again": (0.1, 0.5)}
-"""Problem 2: found sets -> the range W of their search. 'again' are the paper's two problems; on the wide range the
-paper could not fit a hard-wired system."""
+"""Name of a weight set found for Problem 2 -> the velocity range W of its search. The sets 'again' repeat the paper's
+two searches. On the range of 'wide', the paper found no good hard-wired set."""
 
 Place = tuple[str, float, float, ModelVariant]
-"""Observation time, least and greatest velocity, and model variant for which a set was searched."""
+"""Key of a found weight set: observation time, lowest and highest velocity, and model variant of its search."""
 
 
 @cache
 def found_sets(path: Path = FOUND) -> dict[Place, Cruse1998]:
-    """Return all sets that searches found; Problem 1 has one velocity, Problem 2 a range."""
+    """Return the networks of all found weight sets; in Problem 1 the lowest velocity is the highest too."""
     found = {}
     for entry in read_toml(path)["set"]:
         velocities, time = entry["velocities"], entry["observation_time"]
@@ -45,40 +45,40 @@ def found_sets(path: Path = FOUND) -> dict[Place, Cruse1998]:
 
 
 def searched_seeds() -> set[int]:
-    """Return the seeds of these searches and of their starts."""
+    """Return the seeds of the searches that found the weight sets of `FOUND`."""
     return {entry["seed"] for entry in read_toml(FOUND)["set"]}
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """How much is simulated; the defaults are the paper's."""
+    """Numbers of starts, velocities and further settings of all measurements; by default those of the paper."""
 
     samples: int = 7
-    """Samples of starts; the curves of Figs. 2-4 are their means and standard deviations."""
+    """Number of samples of starts, whose means and standard deviations are the curves of Figs. 2-4."""
     sample: int = SAMPLE
-    """Starts of one sample."""
+    """Number of starts in one sample."""
     velocities: tuple[float, ...] = tuple(round(0.05 * n, 2) for n in range(2, 19))
     """Velocities of Figs. 2-4, 0.1 to 0.9 [V_p]."""
     gait_starts: int = 100
-    """Starts of each gait in Section 5.3."""
+    """Number of starts for the gaits of Section 5.3, at each velocity."""
     gait_velocities: tuple[float, ...] = tuple(round(0.05 * n, 2) for n in range(2, 20))
     """Velocities of Figs. 5 and 6, 0.1 to 0.95 [V_p]."""
     footfall_velocities: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7, 0.9)
     """Velocities of the footfall diagrams [V_p]."""
     obstacle_velocities: tuple[float, ...] = (0.3, 0.5, 0.7)
-    """Velocities at which Section 6's obstacles are met [V_p]."""
+    """Velocities of the walks that meet an obstacle (Section 6) [V_p]."""
     obstacle_starts: int = 400
-    """Starts that meet each obstacle."""
+    """Number of starts that meet an obstacle, at each velocity."""
     seed: int = 1998
-    """Seed of all starts; the ideal sets were searched with 0 and 1."""
+    """Seed of all starts; it should not be 0 or 1, the seeds with which the ideal sets were searched."""
     stride: Stride = field(default_factory=Stride)
-    """Step range and time step of the walks whose stability is measured."""
+    """Step range and time step of walks for FLSS."""
     gait_stride: Stride = field(default_factory=lambda: Stride(dt=0.01))
-    """Step range and time step of the gaits, as in Figs. 5 and 6."""
+    """Step range and time step of walks for the steady-state gaits of Figs. 5 and 6."""
     acceleration: Acceleration = field(default_factory=Acceleration)
-    """Eq. 11, for the accelerated walks and all gaits."""
+    """Acceleration by Eq. 11, in accelerated walks, in walks for gaits and after obstacles with 'slow down'."""
     order: Order = "printed"
-    """Order of updates of all networks."""
+    """Order of updates in all networks."""
     model_variant: ModelVariant = field(default_factory=ModelVariant)
     """Model variant of all networks."""
 
@@ -90,13 +90,13 @@ class Protocol:
         whole("seed", self.seed, 0)
 
     def network(self, name: str, observation_time: str, velocity: float) -> Cruse1998 | None:
-        """Return the network of a measurement, with this protocol's order and model variant; None if none is known.
+        """Return a network with this protocol's order and model variant; None if its weights were not searched yet.
 
         Args:
-            name: a preset; 'ideal' (Problem 1) or one of `RANGES` (Problem 2), as found for the observation time and
-                model variant; or 'own', our own preset for this velocity alone.
+            name: name of a preset; 'ideal' (Problem 1) or a key of `RANGES` (Problem 2), for the set found with this
+                observation time and model variant; or 'own', for our own preset for this velocity alone.
             observation_time: 'walk' or 'start'.
-            velocity: V_r, a fraction of V_p.
+            velocity: V_r as a fraction of V_p.
         """
         if name == "own":
             found = PRESETS.get(f"{OWN.get(self.model_variant, 'own')}-{velocity:g}")
@@ -109,7 +109,7 @@ class Protocol:
 
 
 FULL = Protocol()
-"""The paper's protocol: seven times 1000 starts, gaits from 100."""
+"""The paper's protocol: seven samples of 1000 starts, and gaits from 100 starts."""
 
 QUICK = Protocol(
     sample=100,
@@ -120,47 +120,47 @@ QUICK = Protocol(
     obstacle_velocities=(0.3, 0.7),
     obstacle_starts=20,
 )
-"""A tenth of the starts, about half of the velocities, and gaits with a coarser time step."""
+"""Protocol with a tenth of the starts, about half of the velocities, and a coarser time step for gaits."""
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What `hexmj reproduce` judges."""
+    """Options of `hexmj reproduce`."""
 
     quick: bool = False
-    """Fewer starts and velocities, and coarser steps of gaits: under a minute. The full protocol takes several."""
+    """Use fewer starts and velocities: less than a minute. The full protocol takes several minutes."""
     only: tuple[str, ...] = ()
-    """Keys of the claims to judge, without figures; by default all."""
+    """Keys of the claims to judge, without figures; by default all claims, with figures."""
     beside: tuple[str, ...] = ()
-    """Model variants of the network under which the claims are judged too, such as 'lasting'."""
+    """Names of model variants, such as 'lasting', under which the claims are judged too."""
     seed: int = FULL.seed
-    """Seed of the random starts; the ideal sets were searched with 0 and 1."""
+    """Seed of the random starts; the ideal sets were searched with seeds 0 and 1, which flatter them."""
 
     @property
     def protocol(self) -> Protocol:
-        """How much is simulated."""
+        """The full or the quick protocol, with this seed."""
         return replace(QUICK if self.quick else FULL, seed=self.seed)
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """A function of one velocity, and where it is measured."""
+    """A function that measures at one velocity, with its settings and velocities."""
 
     function: Callable[..., Any]
-    """`losses` (Figs. 2-4), `limit_regimes` (Figs. 5 and 6), `footfalls`, or `losses_after` (Section 6)."""
+    """Function: `losses` (Figs. 2-4), `limit_regimes` (Figs. 5, 6), `footfalls` or `losses_after` (Section 6)."""
     at: str
-    """Field of a protocol that holds the velocities."""
+    """Name of the field of `Protocol` that holds the velocities."""
     preset: str
     """Name of the network, see `Protocol.network`."""
     seconds: float = 1.0
-    """Time on two cores, for the progress bar [s]."""
+    """Computing time at all velocities on two cores, for the progress bar [s]."""
     accelerated: bool = False
-    """With Eq. 11."""
+    """Whether walks accelerate by Eq. 11."""
     own: Mapping[str, Any] = field(default_factory=dict)
-    """Further arguments of the function."""
+    """Further arguments of the function, such as `late`."""
 
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
-        """Return the arguments of the function besides velocity and seed."""
+        """Return all arguments of the function except velocity and seed."""
         networks = [protocol.network(self.preset, time, velocity) for time in OBSERVATION_TIMES]
         planned: dict[str, Any] = {"sets": tuple(networks)} if self.function is losses else {"controller": networks[0]}
         starts: dict[Any, int] = {losses: protocol.samples * protocol.sample, limit_regimes: protocol.gait_starts}
@@ -188,11 +188,11 @@ MEASUREMENTS: dict[str, Measurement] = {
     "ldvs halted, postures": _obstacles(4.0, own={"answer": "postures"}),
     "ldvs halted, slows down": _obstacles(12.0, accelerated=True, own={"answer": "slow down"}),
 }
-"""All measurements by name."""
+"""Name of each measurement -> its function and settings."""
 
 
 def cells(name: str, protocol: Protocol) -> dict[float, Cell]:
-    """Return the cells of a measurement by velocity."""
+    """Return the cell (see `sweep.Cell`) of a measurement at each of its velocities, by velocity."""
     measurement = MEASUREMENTS[name]
     velocities: tuple[float, ...] = getattr(protocol, measurement.at)
     work = measurement.seconds / len(velocities)

@@ -1,6 +1,6 @@
-"""Quantities of the paper's claims: one number for every start, at each velocity, from measurements.
+"""Quantities that the paper's claims are about, computed from measurements: values of all starts at each velocity.
 
-Two curves of FLSS are compared on the same starts.
+The difference of two FLSS curves is computed start by start.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PEAK = 0.05
-"""Half the width of a narrow peak of phases."""
+"""Half the width of the main peak of phases, as a fraction of the circle."""
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What was measured under one model variant."""
+    """Measurements under one model variant."""
 
     data: "Mapping[str, xr.Dataset]"
     """Measurements by name, see `protocol.MEASUREMENTS`; the first axis is the velocity."""
@@ -33,7 +33,7 @@ class Measured:
 
 
 class Estimate(NamedTuple):
-    """A value with its 95 % interval, and where it was measured."""
+    """A value, its 95 % interval (low, high), and a text that says at which velocity and pair of legs it holds."""
 
     value: float
     low: float
@@ -43,17 +43,17 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Point:
-    """A quantity at one velocity."""
+    """Values of a quantity at one velocity."""
 
     velocity: float
     of: str
-    """The pair of legs, if there are several points at a velocity."""
+    """Pair of legs, or '' if the quantity does not depend on pairs."""
     values: np.ndarray
-    """(start,)"""
+    """(start,) value for each start; bool for events that are counted."""
 
     @property
     def estimate(self) -> Estimate:
-        """The mean, with Wilson's interval for frequencies, else the normal one; NaN without starts."""
+        """Mean over starts, with Wilson's interval for bool values, else the normal interval; NaN without starts."""
         n, where = len(self.values), f"V = {self.velocity:g}" + (f", {self.of}" if self.of else "")
         if n == 0:
             return Estimate(np.nan, np.nan, np.nan, where)
@@ -66,19 +66,19 @@ class Point:
 
 @dataclass(frozen=True)
 class Losses:
-    """FLSS of a curve, or its difference from a multiple of another curve's."""
+    """FLSS of a measurement, `curve`, or its difference FLSS(curve) - times * FLSS(minus)."""
 
     curve: str
     minus: str | None = None
     times: float = 1.0
     at: float | None = None
-    """Velocity of the other curve; by default the same."""
+    """Velocity of the measurement `minus`; None uses the velocity of `curve`."""
     windowed = True
     """Whether the quantity depends on the observation time."""
 
     @property
     def words(self) -> str:
-        """The quantity in words."""
+        """Text of the quantity, such as 'FLSS(ldvs) - FLSS(hws)'."""
         if self.minus is None:
             return f"FLSS({self.curve})"
         other = self.minus if self.at is None else f"{self.minus} at V = {self.at:g}"
@@ -86,44 +86,44 @@ class Losses:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Names of the measurements."""
+        """Names of the measurements that the quantity needs."""
         return (self.curve,) if self.minus is None else (self.curve, self.minus)
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """Yield a point for each velocity at which all weight sets are known."""
+        """Yield a point for each velocity at which the weight sets of both curves have been searched."""
         curves = [measured.data[name].lost.sel(observation_time=observation_time) for name in self.needs]
         for v in curves[0].velocity.values.tolist():
             other = v if self.at is None else self.at
             if other not in curves[-1].velocity:
                 continue
-            lost, *less = (one.sel(velocity=at).values for one, at in zip(curves, (v, other), strict=False))
-            if all((one != NO_SET).all() for one in (lost, *less)):
+            lost, *less = (curve.sel(velocity=at).values for curve, at in zip(curves, (v, other), strict=False))
+            if all((outcomes != NO_SET).all() for outcomes in (lost, *less)):
                 yield Point(v, "", lost - self.times * less[0] if less else lost.astype(bool))
 
 
 @dataclass(frozen=True)
 class Gaits:
-    """A property of a preset's steady-state gaits, which depends on no observation time."""
+    """A property of the steady-state gaits of a preset, `model`; it does not depend on the observation time."""
 
     model: str
     what: str
-    """A key of `PROPERTIES`."""
+    """Property, a key of `PROPERTIES`."""
     minus_wilson: bool = False
-    """Subtract the phase 1/(1 + V) of Wilson's model."""
+    """Whether the phase 1/(1 + V) of Wilson's model is subtracted."""
     windowed = False
 
     @property
     def words(self) -> str:
-        """The quantity in words."""
+        """Text of the quantity, such as 'ipsilateral phase(hws)'."""
         return f"{self.what}({self.model})" + (" - 1/(1 + V)" if self.minus_wilson else "")
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Names of the measurements."""
+        """Name of the measurement that the quantity needs, in a tuple."""
         return (f"{self.model} {PROPERTIES[self.what][0]}",)
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """Yield a point for each velocity, and for each pair of legs if the property is one of pairs."""
+        """Yield a point for each velocity, or for each velocity and pair of legs if the property belongs to pairs."""
         gaits, values = measured.data[self.needs[0]], PROPERTIES[self.what][1]
         for v in gaits.velocity.values.tolist():
             shift = float(wilson_phase(v)) if self.minus_wilson else None
@@ -133,7 +133,7 @@ class Gaits:
 
 @dataclass(frozen=True)
 class Weight:
-    """A parameter of the weight sets that were found for one velocity each, or the ratio of two parameters."""
+    """A parameter of the ideal weight sets, each found for one velocity, or the absolute ratio parameter / over."""
 
     parameter: str
     over: str | None = None
@@ -142,11 +142,11 @@ class Weight:
 
     @property
     def words(self) -> str:
-        """The quantity in words."""
+        """Text of the quantity, such as 'p2 of ideal sets'."""
         return f"|{self.parameter} / {self.over}| of the ideal sets" if self.over else f"{self.parameter} of ideal sets"
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
-        """Yield a point for each set that was found under the model variant."""
+        """Yield a point for each ideal set that was found for the observation time and model variant."""
         for (time, low, high, variant), network in found_sets().items():
             if (time, high, variant) == (observation_time, low, measured.model_variant):
                 value = getattr(network.weights, self.parameter)
@@ -159,25 +159,25 @@ class Weight:
 Quantity = Losses | Gaits | Weight
 
 QUANTITIES: dict[str, Any] = {"losses": Losses, "gaits": Gaits, "weight": Weight}
-"""Classes by their kind in `claims.toml`."""
+"""Name of each kind of quantity in `claims.toml` -> its class."""
 
 Values = Iterable[tuple[str, np.ndarray]]
-"""Pairs of legs, or an empty text for all legs, each with the values of all starts, (start,)."""
+"""Items of a pair of legs, or '' for all legs, and the values of the starts, (start,)."""
 
 
 def kept(gaits: "xr.Dataset") -> "xr.Dataset":
-    """Return the starts that Section 5.3 takes, at one velocity: with a periodic gait, and stable all the way."""
+    """Return the gaits at one velocity that Section 5.3 considers: periodic, stable, and never unstable before."""
     return gaits.isel(start=np.flatnonzero(gaits.periodic & gaits.stable & ~gaits.lost))
 
 
 def main_peak(phase: np.ndarray) -> np.ndarray:
-    """Return which phases, (start,), lie within `PEAK` of the phase that has most of the others this close."""
+    """Return which phases lie in the main peak, (start,): within `PEAK` of the phase with most phases so close."""
     near = np.abs((phase[:, np.newaxis] - phase + 0.5) % 1.0 - 0.5) <= PEAK
     return near[near.sum(axis=1).argmax()] if len(phase) else np.zeros(0, dtype=bool)
 
 
 def _phases(gaits: "xr.Dataset", pairs: slice) -> Values:
-    """Yield the phases of each pair in its main peak."""
+    """Yield each pair and the phases of its main peak."""
     for pair in gaits.pair.values[pairs].tolist():
         phase = kept(gaits).phase.sel(pair=pair).values
         yield pair, unrolled(phase[main_peak(phase)])
@@ -194,7 +194,7 @@ def _range_of_periods(gaits: "xr.Dataset") -> Values:
 
 
 def _positive_metachrony(gaits: "xr.Dataset") -> Values:
-    """Yield which gaits have this name; the phases of the left side and of the front legs decide."""
+    """Yield whether each gait is positive metachrony, by the phases of the left legs and of the front legs."""
     phases = kept(gaits).phase.sel(pair=["1-2", "2-3", "1-4"]).values
     yield "", np.array([classify(*three) == "positive metachrony" for three in phases.tolist()], dtype=bool)
 
@@ -212,4 +212,4 @@ PROPERTIES: "dict[str, tuple[str, Callable[[xr.Dataset], Values]]]" = {
     "part of starts that come without acceleration to an unstable limit regime": (
         "regimes", lambda gaits: [("", gaits.stable.values == 0)]),
 }  # fmt: skip
-"""Properties of `Gaits`, each with its measurement, and its values in the gaits of one velocity."""
+"""Name of each property of gaits -> kind of measurement, and a function of the gaits at one velocity."""

@@ -1,4 +1,4 @@
-"""`hexmj reproduce`: measure, judge every claim of the paper, draw its figures."""
+"""`hexmj reproduce`: measure what the paper's claims need, judge every claim, and draw the figures."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -25,26 +25,26 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEASURED = "measurements"
-"""Directory of the cached measurements, beside the results."""
+"""Name of the directory of cached measurements, which is inside the results directory."""
 
-NOT_SEARCHED = "not yet searched"
+NOT_SEARCHED = "not yet searched"  # verdict without a weight set
 
 Answers = dict[str, Answer | None]
-"""Answers by observation time, or one under '' if it does not matter; None if a set has not been searched yet."""
+"""Observation time, or '' for gaits, which have none -> answer; None if the weight set was not searched yet."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A claim with our answers."""
+    """A claim and our answers: a row of the table."""
 
     claim: Claim
     answers: Answers
     beside: dict[str, Answers] = field(default_factory=dict)
-    """The answers under other model variants, by name."""
+    """Name of each further model variant -> answers under it."""
 
     @property
     def fits(self) -> str:
-        """The observation time that the paper's number fits, 'both' or 'neither'; empty if that is not the question."""
+        """The observation time under which our value agrees, 'both' or 'neither'; '' without times or answers."""
         if set(self.answers) == {""} or None in self.answers.values():
             return ""
         agreeing = [time for time, answer in self.answers.items() if answer and answer.agrees]
@@ -52,12 +52,12 @@ class Row:
 
     @property
     def why(self) -> str:
-        """The known reason, if we differ."""
+        """Known reason for a difference; '' if every answer agrees."""
         return self.claim.why if "differs" in map(verdict, self.answers.values()) else ""
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """The row as texts: the paper's words, the answers under all variants and observation times, fits and why."""
+        """Texts of the row: claim, answers for all variants and observation times, `fits` and `why`."""
         claim, cells = self.claim, []
         for answers in (self.answers, *self.beside.values()):
             cells += [*map(_cell, answers.values()), "same"][: len(OBSERVATION_TIMES)]
@@ -67,12 +67,12 @@ class Row:
 
 
 def verdict(answer: Answer | None) -> str:
-    """Return 'agrees', 'differs' or that a set has not been searched yet."""
+    """Return 'agrees', 'differs' or `NOT_SEARCHED`."""
     return NOT_SEARCHED if answer is None else "agrees" if answer.agrees else "differs"
 
 
 def _cell(answer: Answer | None) -> str:
-    """Return verdict and number."""
+    """Return the text of an answer: verdict, value, 95 % interval, and where."""
     if answer is None:
         return NOT_SEARCHED
     interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
@@ -82,14 +82,14 @@ def _cell(answer: Answer | None) -> str:
 
 @dataclass(frozen=True)
 class Report:
-    """The claims with our answers, and the files that were written."""
+    """Claims with our answers, and the paths of the written files."""
 
     rows: list[Row]
     protocol: Protocol
     files: list[Path] = field(default_factory=list)
 
     def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return the heads and rows of a table of our answers, under other model variants too."""
+        """Return the column heads and the rows of the table of claims, with a column for each model variant."""
         names = ("ours", *self.rows[0].beside)
         answers = (f"{name}, {time}" for name in names for time in OBSERVATION_TIMES)
         heads = "section", "the paper", "its value", "kind", *answers, "fits", "why"
@@ -97,17 +97,17 @@ class Report:
 
     @property
     def summary(self) -> list[str]:
-        """Sentences that count the verdicts, and say if the starts are those of the searches."""
+        """Lines that count the verdicts, and warn if the weight sets were searched on these starts."""
         lines = summary(self.rows)
         if (seed := self.protocol.seed) in searched_seeds():
-            lines.append(f"seed {seed}: ideal sets were searched on these starts, where they look better than they are")
+            lines.append(f"seed {seed}: the ideal sets were searched on these starts, so their FLSS is too low")
         for name in self.rows[0].beside:
             rows = [Row(row.claim, row.beside[name]) for row in self.rows]
             lines += [f"model variant {name}, {line}" for line in summary(rows)]
         return lines
 
     def markdown(self) -> str:
-        """Return the table, the rule of every row, and the command that recomputes it."""
+        """Return a Markdown document: the table, and for every claim its rule and the command that recomputes it."""
         p, (heads, rows) = self.protocol, self.table()
         size = f"{p.samples} times {p.sample} starts, gaits from {p.gait_starts} starts"
         head = f"{size}; seed {p.seed}.  An answer is the number that strains the rule most, with its 95 % interval,"
@@ -118,13 +118,13 @@ class Report:
             *(f"- {sentence}" for sentence in self.summary), "",
             *io.markdown_table(heads, rows), "", "## Rules and commands", "",
             *io.markdown_table(("the paper", "agrees if", "command"), rules), "",
-            "## Judged in physics", "", "Plans cannot answer these; docs/experiments.md does.", "",
-            *(f"- {one['topic']} (Section 6): {one['text']}; `{one['command']}`" for one in in_physics()),
+            "## Judged in physics", "", "Kinematic walks cannot check these statements; docs/experiments.md does.", "",
+            *(f"- {row['topic']} (Section 6): {row['text']}; `{row['command']}`" for row in in_physics()),
         ]  # fmt: skip
         return "\n".join(lines) + "\n"
 
     def json(self) -> dict[str, Any]:
-        """Return the same as plain numbers and texts."""
+        """Return claims, summary and protocol as plain data, which can be written as JSON."""
         rows = []
         for row in self.rows:
             claim, beside = row.claim, {name: _plain(answers) for name, answers in row.beside.items()}
@@ -135,7 +135,7 @@ class Report:
         return {"claims": rows, "summary": self.summary, "protocol": asdict(self.protocol)}
 
     def command(self, row: Row) -> str:
-        """Return the command that recomputes a row with the same starts and model variants."""
+        """Return the command that recomputes a row with the same protocol, seed and model variants."""
         seed = self.protocol.seed
         words = ["hexmj reproduce --only", row.claim.key]
         words += ["--quick"] if self.protocol == Reproduction(quick=True, seed=seed).protocol else []
@@ -151,24 +151,24 @@ def reproduce(
     beside: Sequence[str] = (),
     **execution: Unpack[Execution],
 ) -> Report:
-    """Measure what the claims need, judge them and draw the figures.
+    """Measure what the claims need, judge the claims and draw the figures.
 
-    Every measured velocity is cached in `out`/measurements, so that a run that was stopped resumes.
+    The measurement at each velocity is cached in `out`/measurements, so that an interrupted run resumes.
 
     Args:
         out: directory for claims.md, claims.json, figures (PDF, PNG and their data as NetCDF) and measurements.
-        protocol: how much is simulated.
-        only: keys of the claims to judge, without figures; by default all.
-        beside: names of model variants under which the claims are judged too.
+        protocol: numbers of starts, velocities and further settings.
+        only: keys of the claims to judge, without figures; empty for all claims, with figures.
+        beside: names of further model variants under which the claims are judged.
         execution: see `sweep.Execution`.
 
     Raises:
-        InputError: no such claim or model variant, or a number of samples that the figures do not draw.
+        InputError: there is no such claim or model variant, or `protocol.samples` is not the number of the figures.
     """
     for key in only:
         choice("claim", key, claims())
     if not only and protocol.samples != SAMPLES:
-        raise InputError(f"samples = {protocol.samples}; the figures draw {SAMPLES}")
+        raise InputError(f"samples = {protocol.samples}; expected {SAMPLES}, which the figures need")
     variants = {name: named_variant(name) for name in beside}
     out = io.results_folder(out)
     judged = [claim for key, claim in claims().items() if not only or key in only]
@@ -203,7 +203,7 @@ def measure(
     folder: Path | str | None = None,
     **execution: Unpack[Execution],
 ) -> Measured:
-    """Take measurements of `MEASUREMENTS` in one sweep over the velocities of all; arguments as of `run_cells`."""
+    """Compute the named `MEASUREMENTS` in one sweep; `folder` and `execution` are arguments of `run_cells`."""
     parts = {name: cells(name, protocol) for name in MEASUREMENTS if name in names}
     results = iter(run_cells([cell for part in parts.values() for cell in part.values()], folder, **execution))
     data: Mapping[str, xr.Dataset] = {
@@ -216,14 +216,14 @@ def measure(
 
 
 def summary(rows: Sequence[Row]) -> list[str]:
-    """Return sentences that count the verdicts, those of calibrated claims separately."""
+    """Return lines that count the verdicts, separately for held-out and calibrated claims."""
     lines = []
     for time in (*OBSERVATION_TIMES, ""):
         counts = []
         for kind in ("held out", "calibrated"):
             answers = [row.answers[time] for row in rows if time in row.answers and row.claim.kind == kind]
             found = Counter(map(verdict, answers))
-            some = [f"{found[one]} {one}" for one in ("agrees", "differs", NOT_SEARCHED) if one in found]
+            some = [f"{found[name]} {name}" for name in ("agrees", "differs", NOT_SEARCHED) if name in found]
             counts.append(f"{kind} {', '.join(some) or 'none judged'}")
         of = f"claims on FLSS and sets, observation time {time}" if time else "claims on gaits"
         lines.append(f"{of}: {'; '.join(counts)}")
@@ -233,7 +233,7 @@ def summary(rows: Sequence[Row]) -> list[str]:
 
 
 def _plain(answers: Answers) -> dict[str, dict[str, Any]]:
-    """Return verdicts and numbers by observation time."""
+    """Return verdict and numbers for each observation time as plain data."""
     return {
         time or "any": {"verdict": verdict(answer)} | (asdict(answer) if answer else {})
         for time, answer in answers.items()

@@ -1,1 +1,1 @@
-"""Search for parameters that minimise the cost function (paper, Section 4)."""
+"""Search for controller parameters that minimise FLSS (paper, Sections 3 and 4)."""

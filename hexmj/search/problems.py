@@ -1,4 +1,4 @@
-"""What is minimised (paper, Section 3): Problem 1, a fixed velocity, and Problem 2, velocities drawn from a range."""
+"""Cost functions of a search (paper, Section 3): Problem 1 at one velocity, Problem 2 at random ones of a range."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from hexmj.physics.settle import Settled
 
 REFUSED = 1.0
-"""Cost of a candidate that its controller refuses, whose targets no leg reaches, or of which a simulation fails: as if
-every start lost stability."""
+"""Cost of a candidate that cannot walk: parameters that the controller rejects, foot targets out of reach, or a failed
+simulation. It counts as if every start lost stability."""
 
 Over = Literal["usual", "mean", "worst"]
 Ties = Literal["equal", "later"]
@@ -38,66 +38,66 @@ Ties = Literal["equal", "later"]
 
 @dataclass(frozen=True)
 class Problem:
-    """A cost function G: FLSS of controllers of a form, I_N^t of Eq. 9 or J_N^t of Eq. 10."""
+    """A cost function G of a form's parameters: the FLSS I_N^t of Eq. 9 or J_N^t of Eq. 10."""
 
     form: Form
-    """Which parameters are free."""
+    """Form that defines the free parameters."""
     low: float
-    """Least velocity of the range W, a fraction of V_p; Problem 1 if it is also the greatest."""
+    """Lowest velocity of the range W, a fraction of V_p; Problem 1 has low = high."""
     high: float
-    """Greatest velocity of the range W, a fraction of V_p."""
+    """Highest velocity of the range W, a fraction of V_p."""
     observation_time: str | float = "walk"
-    """'walk', 'start' or a number of time units."""
+    """Time in which a start must keep stability: 'walk', 'start' or a number of time units."""
     stride: Stride = field(default_factory=Stride)
-    """Step range, lines of the tips and time step."""
+    """Step range, lines along which the tips move, and time step."""
     acceleration: Acceleration | None = None
-    """The accelerating procedure of Eq. 11."""
+    """Acceleration to the velocity by Eq. 11; None starts at the velocity."""
     conditions: Conditions | None = None
-    """Conditions of physical walks, whose falls are minimised; None minimises losses of kinematic stability."""
+    """Conditions of physical walks, in which falls count; None counts losses of stability in kinematic walks."""
     feedback: bool = False
-    """Candidates use sensory feedback, in physical walks."""
+    """Whether candidates use sensory feedback, which needs physical walks."""
     over: Over = "usual"
-    """Minimise the FLSS as given (usual), or its mean or worst over variants of constants and rules that the paper does
-    not print (in physical walks without AEP0 11). A variant that the problem has anyway gets the default instead."""
+    """Cost: FLSS with these settings (usual), or its mean or maximum over variants, each with one changed constant or
+    rule that the paper does not print (mean, worst). Physical walks omit the variant AEP0 11, which is out of reach."""
     ties: Ties = "equal"
-    """If two candidates lose equally many starts, they cost the same (equal), or later losses cost less (later), which
-    shows a way if all starts lose stability."""
+    """Candidates that lose equally many starts cost the same (equal), or later losses cost less (later), which guides a
+    search in which all starts lose stability."""
 
     def __post_init__(self) -> None:
         choice("over", self.over, get_args(Over))
         choice("ties", self.ties, get_args(Ties))
         if self.low > self.high:
-            raise InputError(f"velocity range {self.low} to {self.high}; expected the least velocity first")
+            raise InputError(f"velocity range {self.low} to {self.high}; expected the lower velocity first")
         observed(sorted({self.low, self.high}), self.observation_time, self.stride, self.acceleration)
         if self.feedback and not self.conditions:
-            raise InputError("feedback = True needs physical walks; the problem has no conditions")
+            raise InputError("feedback = True needs physical walks, but conditions = None")
         if self.conditions:
             check_ground(self.conditions)
         if self.over != "usual" and not isinstance(self.form, NetworkForm):
-            raise InputError(f"over = {self.over!r} needs a form of the 1998 network")
+            raise InputError(f"over = {self.over!r} needs a form of the 1998 network (NetworkForm)")
 
     @property
     def observation_times(self) -> list[str | float]:
-        """The observation time of the cost, and the named ones."""
+        """Observation times of the verdict: that of the cost first, then 'walk' (if all V > 0) and 'start'."""
         named = [name for name in OBSERVATION_TIMES if self.low > 0 or name != "walk"]
         return list(dict.fromkeys([self.observation_time, *named]))
 
     def domain(self, reach: float, begin: Controller | None = None) -> Domain:
-        """Return the box of the first population, with the vector of `begin` if that is given.
+        """Return the box of the initial population, which begins with the vector of `begin`, if given.
 
-        At a reach of 1 the greater magnitude of a parameter's ends is its unit.
+        `reach` scales the box, see `Effort.domain`. The unit of a parameter is its largest magnitude for a reach of 1.
         """
         number("domain", reach, 1e-6, 1e6)
         vector, unit = self.form.vector(begin) if begin else self.form.begin, np.abs(self.form.box(1.0)).max(axis=0)
         return Domain(*self.form.box(reach), self.form.binary, vector, unit)
 
     def controller(self, vector: np.ndarray) -> Controller:
-        """Return the controller of a candidate, (parameter,)."""
+        """Return the controller with the parameters of a candidate, (parameter,)."""
         controller = self.form.controller(vector)
         return SensoryFeedback(controller) if self.feedback else controller
 
     def refusal(self, vector: np.ndarray) -> str:
-        """Return why no controller can be made of a candidate, (parameter,); an empty text if one can."""
+        """Return the error that a controller raises for the parameters of a candidate, (parameter,), else ''."""
         try:
             self.controller(vector)
         except ValueError as error:
@@ -106,7 +106,7 @@ class Problem:
 
     @property
     def minimised(self) -> str:
-        """The cost in words."""
+        """Description of the cost."""
         lost = "that fell" if self.conditions else "lost"
         later = f"(starts {lost} + mean part of the time lost) / (starts + 1)"
         cost = later if self.ties == "later" else "FLSS"
@@ -123,7 +123,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Sample:
-    """The starts on which all candidates are judged: the first of a seed, as `flss` and `flss_over_range` draw them."""
+    """Starts on which all candidates walk: the first of a seed, as in `flss` and `flss_over_range`."""
 
     problem: Problem
     n_starts: int
@@ -131,7 +131,7 @@ class Sample:
 
     @cached_property
     def variants(self) -> "dict[str, Sample]":
-        """The same starts for each of the problem's variants, over which `over` is taken, by name."""
+        """Samples of the same starts under each variant that `Problem.over` combines, by the variant's name."""
         problem = self.problem
         if problem.over == "usual":
             return {"usual": self}
@@ -144,12 +144,12 @@ class Sample:
 
     @cached_property
     def starts(self) -> np.ndarray:
-        """(start, leg) tips at time 0 [mm]."""
+        """(start, leg) initial tip positions along the step lines [mm]."""
         return draw_starts(self.n_starts, self.seed, self.problem.stride)
 
     @cached_property
     def velocity(self) -> np.ndarray:
-        """(start,) V_r of each start, a fraction of V_p."""
+        """(start,) velocity V_r of each start, as a fraction of V_p."""
         return np.random.default_rng([self.seed, 1]).uniform(self.problem.low, self.problem.high, self.n_starts)
 
     @cached_property
@@ -157,7 +157,7 @@ class Sample:
         return []
 
     def settle(self, threads: int | None = None) -> None:
-        """Let the starts of all variants come to rest if candidates walk physically, or raise SimulationError."""
+        """For physical walks, let the body settle at all starts; raise SimulationError if it does not come to rest."""
         from hexmj.physics.settle import settle
 
         for one in self.variants.values():
@@ -165,16 +165,16 @@ class Sample:
                 one._settled.append(settle(one.starts, one.problem.conditions, one.problem.stride, threads))
 
     def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
-        """Return G of each candidate, (candidate,), from (candidate, parameter)."""
+        """Return the cost of each candidate, (candidate,), from the parameters, (candidate, parameter)."""
         self.settle(threads)
         return self._combined([[one._cost(vector, threads) for vector in vectors] for one in self.variants.values()])
 
     def _combined(self, values: Any) -> np.ndarray:
-        """Combine values of all variants, (variant, ...), into the one that is minimised, (...)."""
+        """Return the mean or the largest of all variants' values, (variant, ...) -> (...), see `Problem.over`."""
         return np.mean(values, axis=0) if self.problem.over == "mean" else np.max(values, axis=0)
 
     def _cost(self, vector: np.ndarray, threads: int | None) -> float:
-        """Return FLSS; if ties are broken, the mean part of the time lost counts as one more start."""
+        """Return the FLSS; with ties 'later', the mean fraction of the time that is lost counts as one more start."""
         if self.problem.refusal(vector):
             return REFUSED
         try:
@@ -187,15 +187,15 @@ class Sample:
         return (lost + np.mean(1.0 - np.minimum(times / ends, 1.0)).item()) / (self.n_starts + 1)
 
     def lost(self, cost: float) -> int | None:
-        """Return how many starts were lost, or fell, at a cost; None for a mean over variants."""
+        """Return the number of starts that lost stability, or fell, from a cost; None for a mean over variants."""
         if self.problem.over == "mean":
             return None
         if self.problem.ties == "equal":
             return round(cost * self.n_starts)
-        return min(int(cost * (self.n_starts + 1) + 1e-9), self.n_starts)  # less than one start more for the time
+        return min(int(cost * (self.n_starts + 1) + 1e-9), self.n_starts)  # the time lost adds less than one start
 
     def check_walks(self, vector: np.ndarray, threads: int | None = None) -> None:
-        """Raise the InputError or SimulationError of a candidate, (parameter,), that does not walk."""
+        """Raise InputError or SimulationError if a candidate, (parameter,), cannot walk; return None otherwise."""
         self.settle(threads)
         for one in self.variants.values():
             one._times(one.problem.controller(vector), [one.problem.observation_time], threads)
@@ -203,10 +203,10 @@ class Sample:
     def verdict(
         self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None
     ) -> "xr.Dataset":
-        """Return FLSS of controllers over (controller, observation time) with its 95 % Wilson interval.
+        """Return the FLSS of each controller and observation time, with its 95 % Wilson interval.
 
-        The interval of a mean over variants is that of the rounded mean count. It is rather too wide: as if all
-        variants lost stability together. Raises InputError if a controller does not walk.
+        The interval of a mean over variants is that of the rounded mean count. It is too wide, because it assumes that
+        a start is lost under all variants or under none. Raises InputError if a controller cannot walk.
         """
         import xarray as xr
 
@@ -215,7 +215,7 @@ class Sample:
         advance = part_of(progress, 1.0 / len(controllers) / len(self.variants))
 
         def losses(variant: str, controller: Controller) -> np.ndarray:
-            """Return the number of starts lost within each observation time, (observation time,)."""
+            """Return the number of starts that lose stability within each observation time, (observation time,)."""
             times, ends = self.variants[variant]._times(varied(controller, variant), observation_times, threads)
             if advance:
                 advance(1.0)
@@ -231,10 +231,11 @@ class Sample:
     def _times(
         self, controller: Controller, observation_times: list[str | float], threads: int | None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return when each start loses stability, or falls, and the ends of its observation times [time units].
+        """Walk, and return when each start loses stability, or falls, and when its observation times end.
 
         Returns:
-            (start,) and (observation time, start). An end is a millionth of a step late, so that the last step counts.
+            Times of loss, (start,), and ends, (observation time, start) [time units]. An end is later by a millionth
+            of a step, so that a loss in the last step counts.
         """
         p, dt = self.problem, self.problem.stride.dt
         times = [observation_duration(time, self.velocity, p.stride, p.acceleration) for time in observation_times]

@@ -1,4 +1,4 @@
-"""A search with a verdict on fresh starts, and its files: found.toml, the history and its figure."""
+"""A search, the FLSS of its result on fresh starts, and its files: found.toml, the history and a figure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -25,36 +25,36 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-FOUND = "found.toml"
+FOUND = "found.toml"  # file of the found controller
 
 EVALUATIONS = "evaluations"
-"""Directory of the cached evaluations, beside the results."""
+"""Name of the directory of cached evaluations, which is inside the results directory."""
 
 COLOURS = dict(zip(STAGES, ("#1b6ca8", "#b3261e"), strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What a search found, and how it compares on fresh starts."""
+    """The controller that a search found, and its FLSS on fresh starts beside that of known controllers."""
 
     problem: Problem
     effort: Effort
     found: Found
     vectors: dict[str, np.ndarray]
-    """Parameters, (parameter,), of the found controller and of those with which it is compared, by name."""
+    """Parameters, (parameter,), of the found controller and of the compared controllers, by name."""
     verdict: "xr.Dataset"
-    """FLSS with its 95 % interval on fresh starts, over the same controllers and the observation times."""
+    """FLSS with its 95 % interval on fresh starts, over (controller, observation time)."""
     files: list[Path]
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Problem and effort as plain data."""
+        """Problem and effort as plain data, which can be written as JSON."""
         effort = plain(self.effort)
         fresh = {name: effort.pop(name) for name in ("verdict_starts", "verdict_seed")}
         return {"problem": self.problem.settings(), "effort": effort} | fresh
 
     def summary(self) -> dict[str, Any]:
-        """Return parameters, cost, verdict and settings as plain data."""
+        """Return parameters, cost, verdict and settings as plain data, which can be written as JSON."""
         found, judged = self.found, self.verdict.to_dataframe()
         names, times = judged.index.levels
         return {
@@ -81,38 +81,37 @@ def run_search(
     fresh: bool = False,
     figure: str = "convergence.png",
 ) -> Result:
-    """Search, judge what was found on fresh starts, and write it.
+    """Search, compute the FLSS of the found controller on fresh starts, and write all files.
 
-    The found controller is compared with HWS and LDVS, or with the usual values of the controller that is searched.
+    The found controller is compared with HWS and LDVS, or with the default fields of the searched controller.
 
     Args:
         problem: the cost function.
         effort: algorithm, budgets and starts.
-        out: directory for the found controller (TOML), the history (NetCDF), its figure and the cached evaluations. If
-            a search is killed, the next one with the same settings resumes with equal results.
-        threads: one per core by default; the result does not depend on them.
-        progress: show bars.
-        fresh: discard cached evaluations.
-        figure: name of the figure's file.
+        out: directory for the found controller (TOML), the history (NetCDF), its figure and the cached evaluations. An
+            interrupted search resumes if it is called with the same settings, and gives equal results.
+        threads: number of threads, by default one per core; the result does not depend on it.
+        progress: whether to show progress bars.
+        fresh: whether to discard the cached evaluations.
+        figure: file name of the figure.
 
     Raises:
-        InputError: settings that make no sense, verdict starts on which a search was made, or a controller that does
-            not walk.
+        InputError: a setting is invalid, `verdict_seed` is the seed of an involved search, or a controller cannot walk.
         SimulationError: a simulation fails.
     """
     effort = effort.completed(physical=problem.conditions is not None)
     earlier = _earlier_seeds(problem, effort)
     if effort.verdict_seed in {effort.seed, *earlier}:
-        searches = "this search and those that found its beginning"
-        raise InputError(f"verdict_seed = {effort.verdict_seed}; expected another seed than those of {searches}")
+        used = f"{sorted({effort.seed, *earlier})}, the seeds of this search and of earlier ones"
+        raise InputError(f"verdict_seed = {effort.verdict_seed}; expected a seed other than {used}")
     begins = [Path(name).resolve() for name in (effort.begin, problem.form.name) if isinstance(name, str)]
     if (Path(out) / FOUND).resolve() in begins:
-        raise InputError(f"out = {out}: the search begins with {FOUND} there; expected another directory")
-    problem.domain(effort.domain, effort.beginning)  # raises before a directory is made
+        raise InputError(f"out = {out}: the search begins with {FOUND} of this directory; expected another one")
+    problem.domain(effort.domain, effort.beginning)  # raises InputError before a directory is made
     controllers, vectors = _compared(problem)
     judges = Sample(problem, effort.verdict_starts or 0, effort.verdict_seed)
     out = results_folder(out)
-    judges.settle(threads)  # before the work, if a start does not
+    judges.settle(threads)  # raises SimulationError before the search
     found = search(problem, effort, folder=out / EVALUATIONS, threads=threads, progress=progress, fresh=fresh)
     history = found.history.assign_attrs(title=title(problem, effort))
     head = f"# hexmj search: {title(problem, effort)}\nsearched = {{ seeds = {sorted({*earlier, effort.seed})} }}\n"
@@ -125,7 +124,7 @@ def run_search(
 
 
 def title(problem: Problem, effort: Effort) -> str:
-    """Return form, cost, velocities and algorithm of a search in words."""
+    """Return the title of a search: form, cost, velocities, observation time and algorithm."""
     at = f"V = {problem.low:g}" if problem.low == problem.high else f"V from {problem.low:g} to {problem.high:g}"
     at += f", {problem.over} of all variants" if problem.over != "usual" else ""
     at += ", later losses first among equals" if problem.ties == "later" else ""
@@ -135,7 +134,7 @@ def title(problem: Problem, effort: Effort) -> str:
 
 
 def _earlier_seeds(problem: Problem, effort: Effort) -> set[int]:
-    """Return the seeds of the searches that found what this search begins with."""
+    """Return the seeds of the earlier searches that found the controllers with which this search begins."""
     begins = [problem.form.name] if isinstance(problem.form, FieldsForm) else []
     if effort.beginning is not None:
         begins.append(effort.begin if isinstance(effort.begin, str) else effort.beginning.name)
@@ -143,22 +142,22 @@ def _earlier_seeds(problem: Problem, effort: Effort) -> set[int]:
 
 
 def _compared(problem: Problem) -> tuple[Mapping[str, Controller], dict[str, np.ndarray]]:
-    """Return the controllers with which the found one is compared, by name, and their parameters, (parameter,)."""
+    """Return the controllers that are compared with the found one, and their parameters, (parameter,), by name."""
     form = problem.form
     controllers: Mapping[str, Controller]
     if isinstance(form, FieldsForm):
         controllers, vectors = {"usual": form.usual}, {"usual": form.begin}
     else:
         sets, rules = {"hws": HWS, "ldvs": LDVS}, {"order": form.order, "model_variant": form.model_variant}
-        controllers = {name: replace(one, **rules) for name, one in sets.items()}
-        vectors = {name: form.parameters(one.weights) for name, one in sets.items()}
+        controllers = {name: replace(network, **rules) for name, network in sets.items()}
+        vectors = {name: form.parameters(network.weights) for name, network in sets.items()}
     if problem.feedback:
-        controllers = {name: SensoryFeedback(one) for name, one in controllers.items()}
+        controllers = {name: SensoryFeedback(inner) for name, inner in controllers.items()}
     return controllers, vectors
 
 
 def _controller_toml(problem: Problem, vector: np.ndarray) -> str:
-    """Return the text that `load_controller` reads to the same bits: weights, or a controller and its fields."""
+    """Return TOML text that `load_controller` reads back exactly: weights, or a controller and its fields."""
     import tomli_w
 
     form = problem.form
@@ -171,20 +170,20 @@ def _controller_toml(problem: Problem, vector: np.ndarray) -> str:
 
 
 def convergence_figure(history: "xr.Dataset") -> "Figure":
-    """Draw all candidates' costs and the least so far against the number of evaluations, from `stages.history`."""
+    """Draw the costs of all candidates and the lowest cost so far over the evaluations, from `stages.history`."""
     figure = picture(6.8, 4.2)
     axes = figure.subplots()
     for number, (stage, colour) in enumerate(COLOURS.items()):
-        one = history.isel(evaluation=history.stage.values == number).sortby("evaluation")
-        if one.sizes["evaluation"]:
-            evaluation = one.evaluation + 1
-            axes.plot(evaluation, one.cost, ".", color=colour, markersize=2.5, alpha=0.35)
-            axes.plot(evaluation, one.best, color=colour, linewidth=1.8, label=stage)
+        part = history.isel(evaluation=history.stage.values == number).sortby("evaluation")
+        if part.sizes["evaluation"]:
+            evaluation = part.evaluation + 1
+            axes.plot(evaluation, part.cost, ".", color=colour, markersize=2.5, alpha=0.35)
+            axes.plot(evaluation, part.best, color=colour, linewidth=1.8, label=stage)
     cost = history.cost.attrs["long_name"]
     label = f"{'FLSS' if cost == 'FLSS' else 'cost'} on the starts of the stage"
     axes.set(xlabel="evaluations of the cost function", ylabel=label, ylim=(-0.02, 1.02))
     head(figure, in_figure(history.attrs["title"]))
     tidy(axes)
-    below = "lines: least so far, dots: candidates" + ("" if cost == "FLSS" else f"\ncost: {cost}")
+    below = "lines: lowest cost so far, dots: candidates" + ("" if cost == "FLSS" else f"\ncost: {cost}")
     figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9, title=below, title_fontsize=8)
     return figure

@@ -1,4 +1,4 @@
-"""A search (paper, Section 4): a population on few starts, then the downhill simplex on many."""
+"""A search in two stages (paper, Section 4): a population on few starts, then the downhill simplex on many."""
 
 import json
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from hexmj.validate import choice, whole
 if TYPE_CHECKING:
     import xarray as xr
 
-STAGES: tuple[str, ...] = ("population", "simplex")
+STAGES: tuple[str, ...] = ("population", "simplex")  # in their order
 
 
 @dataclass(frozen=True)
@@ -32,30 +32,30 @@ class Effort:
     """Algorithm, budgets and starts of a search."""
 
     algorithm: Literal["evolution", "cmaes"] = "evolution"
-    """The paper's evolutionary algorithm, or CMA-ES."""
+    """Algorithm of the population: the paper's evolution, or CMA-ES."""
     population: int = 10
-    """Individuals of a generation; the paper's L."""
+    """Number of individuals in a generation, the paper's L."""
     domain: float = 10.0
-    """The first population's shifts [mm] and weights are drawn from 0 to this, its neutral positions [mm] from minus
-    this to this; the paper does not print it. Fields of another controller: from 0 to this times the usual value, or to
-    this if that is 0."""
+    """Range of the initial population, which the paper does not print: shifts [mm] and weights from 0 to D, neutral
+    positions [mm] from -D to D. Fields of another controller: from 0 to D times the default, or to D if the default is
+    0."""
     begin: str | Controller | None = None
-    """Controller from which the population begins. By default the paper's '0'-individual (evolution), the middle of
-    the domain (cmaes), or the usual values of a controller of your own."""
+    """Controller from which the population begins. Default: all weights 0, the paper's '0'-individual (evolution); the
+    middle of the domain (cmaes); or, for a controller of your own, its default field values."""
     starts: int | None = None
-    """Random starts of each candidate, the same for all; by default 500, or 50 in physical walks."""
+    """Number of random starts on which every candidate walks; by default 500, or 50 in physical walks."""
     budget: int = 1000
-    """Most evaluations of the population's search; for L = 10 about the paper's 100 iterations."""
+    """Maximum number of evaluations by the population; 1000 are about the paper's 100 iterations with L = 10."""
     refine_starts: int | None = None
-    """Random starts of each candidate of the simplex; by default 7000, or 100 in physical walks."""
+    """Number of random starts for the simplex; by default 7000, or 100 in physical walks."""
     refine_budget: int = 400
-    """Most evaluations of the simplex; 0 leaves it out."""
+    """Maximum number of evaluations by the simplex; 0 omits the simplex."""
     seed: int = 0
-    """Seed of the starts, their velocities and the algorithm."""
+    """Seed of the starts, of their velocities and of the algorithm."""
     verdict_starts: int | None = None
-    """Fresh random starts for the verdict; by default 7000, or 200 in physical walks."""
+    """Number of fresh random starts for the final FLSS; by default 7000, or 200 in physical walks."""
     verdict_seed: int = 1998
-    """Seed of the fresh starts; another than that of the search."""
+    """Seed of the fresh starts; it must differ from the seed of the search."""
 
     def __post_init__(self) -> None:
         if choice("algorithm", self.algorithm, ("evolution", "cmaes")) == "cmaes" and find_spec("cmaes") is None:
@@ -70,13 +70,13 @@ class Effort:
         check_draw(1, self.verdict_seed, seed_name="verdict_seed")
 
     def completed(self, physical: bool) -> "Effort":
-        """Return the effort with numbers of starts in place of None."""
+        """Return the effort with the default numbers of starts in place of None."""
         sizes = {"starts": (500, 50), "refine_starts": (7 * SAMPLE, 100), "verdict_starts": (7 * SAMPLE, 200)}
         return replace(self, **{name: both[physical] for name, both in sizes.items() if getattr(self, name) is None})
 
     @property
     def beginning(self) -> Controller | None:
-        """The controller that `begin` names."""
+        """The controller `begin`, loaded if it is a name; None without one."""
         return load_controller(self.begin) if isinstance(self.begin, str) else self.begin
 
 
@@ -85,31 +85,31 @@ class Found:
     """The outcome of a search."""
 
     vector: np.ndarray
-    """(parameter,) best candidate of the last stage."""
+    """(parameter,) candidate with the lowest cost in the last stage."""
     cost: float
-    """Its cost on the starts of that stage, see `Problem.minimised`."""
+    """Cost of this candidate on the starts of the last stage, see `Problem.minimised`."""
     lost: int | None
-    """Number of these starts that were lost, or fell; None for a mean over variants."""
+    """Number of starts of the last stage that it loses (falls in physical walks); None for a mean over variants."""
     starts: int
-    """Number of these starts."""
+    """Number of starts of the last stage."""
     history: "xr.Dataset"
-    """All candidates and their costs, see `history`."""
+    """All candidates and their costs, see the function `history`."""
     replayed: int
-    """Number of distinct candidates whose costs an earlier run had cached."""
+    """Number of distinct candidates whose costs were read from the cache of an earlier run."""
     refused: list[str]
-    """Reasons for which no controller could be made of candidates, which cost 1 each. Candidates that do not walk,
-    reach too far or whose simulation fails cost 1 too, and are not listed."""
+    """Error messages of the candidates whose parameters the controller rejects. Candidates that cannot walk, whose tip
+    targets are out of reach or whose simulation fails cost 1 too, but are not listed."""
 
     def report(self, problem: Problem) -> list[str]:
-        """Return sentences on the evaluations, the least cost and refused candidates."""
-        least = f"least cost {self.cost:.4g}"
+        """Return lines for printing: evaluations, lowest cost, and candidates that cost 1 or were refused."""
+        least = f"lowest cost {self.cost:.4g}"
         if problem.ties == "later":
             least += f" ({problem.minimised}" + (f"; {self.lost} of {self.starts} starts lost)" if self.lost else ")")
-        lines = [f"{len(self.history.cost)} evaluations, {self.replayed} candidates from an earlier run; {least}"]
+        lines = [f"{len(self.history.cost)} evaluations ({self.replayed} candidates from the cache); {least}"]
         if lost := int((self.history.cost.values >= REFUSED).sum()):
-            lines.append(f"{lost} evaluations cost 1: all starts lost stability, or the candidate does not walk")
+            lines.append(f"{lost} evaluations cost 1: all starts lost stability, or the candidate cannot walk")
         if self.refused:
-            lines.append(f"{len(self.refused)} candidates were refused, the first by {self.refused[0]}")
+            lines.append(f"{len(self.refused)} candidates were refused; the first error: {self.refused[0]}")
         return lines
 
 
@@ -122,19 +122,19 @@ def search(
     progress: Progress | bool | None = None,
     fresh: bool = False,
 ) -> Found:
-    """Search with a population, then refine the best candidate; the simplex leaves binary parameters as they are.
+    """Search with a population, then refine the best candidate with the simplex, except its binary parameters.
 
     Args:
         problem: the cost function.
         effort: algorithm, budgets and starts.
-        folder: caches every evaluation; a search that is killed resumes with equal results.
-        threads: one per core by default; the result does not depend on them.
-        progress: True shows a bar; a function receives the fraction done since its last call.
-        fresh: discard the cached evaluations of this search.
+        folder: directory that caches every evaluation, so that an interrupted search resumes with equal results.
+        threads: number of threads, by default one per core; the result does not depend on it.
+        progress: True shows a bar; a function receives the fraction of the work since its last call.
+        fresh: whether to discard the cached evaluations of this search.
 
     Raises:
-        InputError: settings that make no sense, or a best candidate that its controller refuses.
-        SimulationError: a start does not settle, or the best candidate's simulation fails.
+        InputError: a setting is invalid, or the best candidate cannot walk.
+        SimulationError: the body does not settle at a start, or the simulation of the best candidate fails.
     """
     effort = effort.completed(physical=problem.conditions is not None)
     domain = problem.domain(effort.domain, effort.beginning)
@@ -143,7 +143,7 @@ def search(
     work = sum(budgets[stage] * sizes[stage] for stage in STAGES)
     samples = {stage: Sample(problem, sizes[stage], effort.seed) for stage in STAGES if budgets[stage]}
     how: Any = {"threads": threads, "fresh": fresh}
-    cached = {stage: CachedValues(Cell(stage, one.costs, {}), folder, **how) for stage, one in samples.items()}
+    cached = {stage: CachedValues(Cell(stage, sample.costs, {}), folder, **how) for stage, sample in samples.items()}
     evaluated: list[Evaluated] = []
     with shown(progress, "searching") as advance:
         for sample in samples.values():
@@ -151,11 +151,11 @@ def search(
 
         def costs(stage: str, candidates: np.ndarray) -> np.ndarray:
             result = np.empty(len(candidates))
-            together = 1 if problem.conditions else len(candidates)  # physical walks take long: each is cached at once
-            for i in range(0, len(candidates), together):
-                result[i : i + together] = cached[stage](candidates[i : i + together])
+            size = 1 if problem.conditions else len(candidates)  # cache each physical cost at once, as walks take long
+            for i in range(0, len(candidates), size):
+                result[i : i + size] = cached[stage](candidates[i : i + size])
                 if advance:
-                    advance(together * sizes[stage] / work)
+                    advance(size * sizes[stage] / work)
             evaluated.append((stage, candidates.copy(), result))
             return result
 
@@ -167,7 +167,7 @@ def search(
     course = history(evaluated, problem.form.names, problem.minimised)
     refused = list(filter(None, map(problem.refusal, course.candidate.values)))
     if reason := problem.refusal(best):
-        raise InputError(f"{len(refused)} of {len(course.cost)} candidates were refused, the best one: {reason}")
+        raise InputError(f"{len(refused)} of {len(course.cost)} candidates were refused, also the best: {reason}")
     last = list(samples.values())[-1]
     if cost >= REFUSED:
         last.check_walks(best, threads)
@@ -178,19 +178,19 @@ def search(
 
 
 Evaluated = tuple[str, np.ndarray, np.ndarray]
-"""A stage, some of its candidates, (candidate, parameter), and their costs, (candidate,)."""
+"""Name of a stage, candidates evaluated together, (candidate, parameter), and their costs, (candidate,)."""
 
 
 def history(evaluated: Sequence[Evaluated], names: Sequence[str], minimised: str) -> "xr.Dataset":
-    """Return stage, candidate, cost and least cost so far of the stage over `evaluation`, counted from 0.
+    """Return stage, candidate, cost and the stage's lowest cost so far for every evaluation, in order from 0.
 
-    `names` are those of the parameters, and `minimised` is the cost in words.
+    `names` are the names of the parameters, and `minimised` describes the cost, see `Problem.minimised`.
     """
     import pandas as pd
     import xarray as xr
 
     stages, candidates, costs = zip(*evaluated, strict=True)
-    stage, cost = np.repeat([STAGES.index(one) for one in stages], [*map(len, costs)]), np.concatenate(costs)
+    stage, cost = np.repeat([STAGES.index(name) for name in stages], [*map(len, costs)]), np.concatenate(costs)
     best = pd.Series(cost).groupby(stage).cummin().values
     flags = {"flag_values": [0, 1], "flag_meanings": " ".join(STAGES)}
     return xr.Dataset(
