@@ -105,7 +105,7 @@ class Found:
         least = f"lowest cost {self.cost:.4g}"
         if problem.ties == "later":
             least += f" ({problem.minimised}" + (f"; {self.lost} of {self.starts} starts lost)" if self.lost else ")")
-        lines = [f"{len(self.history.cost)} evaluations ({self.replayed} candidates from the cache); {least}"]
+        lines = [f"{len(self.history.cost)} evaluations, {self.replayed} candidates from the cache; {least}"]
         if lost := int((self.history.cost.values >= REFUSED).sum()):
             lines.append(f"{lost} evaluations cost 1: all starts lost stability, or the candidate cannot walk")
         if self.refused:
