@@ -123,7 +123,7 @@ class Seen(Rule):
     def words(self) -> str:
         """Text of the rule for the table of claims."""
         return (
-            f"at {self.span} Fisher's test does not tell the {self.quantity.words} from {self.count} of"
+            f"at {self.span} Fisher's test finds no difference between {self.quantity.words} and {self.count} of"
             f" {self.of} starts, the paper's own sample (p >= {LEVEL:g})"
         )
 

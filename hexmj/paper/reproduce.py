@@ -110,11 +110,11 @@ class Report:
         """Return a Markdown document: the table, and for every claim its rule and the command that recomputes it."""
         p, (heads, rows) = self.protocol, self.table()
         size = f"{p.samples} times {p.sample} starts, gaits from {p.gait_starts} starts"
-        head = f"{size}; seed {p.seed}.  An answer is the number that strains the rule most, with its 95 % interval,"
+        head = f"{size}; seed {p.seed}.  An answer is the value that is farthest from agreeing with the rule,"
         rows = [[cell.replace("differs:", "**differs**:") for cell in row] for row in rows]
         rules = [(row.claim.text, row.claim.rule.words, f"`{self.command(row)}`") for row in self.rows]
         lines = [
-            "# The claims of the 1998 paper", "", f"{head} and where.", "",
+            "# The claims of the 1998 paper", "", f"{head} its 95 % interval and where it occurs.", "",
             *(f"- {sentence}" for sentence in self.summary), "",
             *io.markdown_table(heads, rows), "", "## Rules and commands", "",
             *io.markdown_table(("the paper", "agrees if", "command"), rules), "",
