@@ -106,7 +106,7 @@ class Task:
 
 
 def observation_bounds(compiled: CompiledBody, task: Task) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return the smallest and largest value of each observation by name, two arrays in the observation's shape."""
+    """Return the smallest and largest values of each observation, two arrays of its shape, by name."""
     lengths, ranges = compiled.body.lengths, compiled.model.actuator_ctrlrange[compiled.columns.ctrl]
     far, tall = -lengths.no_foot_margin, compiled.body.standing_height
     fastest = np.sqrt(2.0 * compiled.weight / compiled.body.mass * FASTEST * tall)

@@ -1,4 +1,4 @@
-"""Quantities that the paper's claims are about, computed from measurements: values of all starts at each velocity.
+"""Quantities of the paper's claims, computed from measurements: a value for every start at each velocity.
 
 The difference of two FLSS curves is computed start by start.
 """

@@ -71,10 +71,10 @@ class Evolution:
 
 
 def selection_probabilities(costs: np.ndarray) -> np.ndarray:
-    """Return the probability P(q_j) of copying each individual, (individual,); 1 for individual 1 if K = 0."""
+    """Return P(q_j), the probability of copying each individual, (individual,), by its advantage over individual 1."""
     advantage = np.maximum(costs[0] - costs, 0.0)
     if not advantage.any():
-        return np.eye(len(costs))[0]
+        return np.eye(len(costs))[0]  # K = 0 in Section 4.1.1: only individual 1 is copied
     advantage /= advantage.max()
     return advantage / advantage.sum()
 

@@ -51,7 +51,7 @@ class FieldsForm:
         if not self.names:
             raise InputError(f"{self.usual.name} has no fields of type float, which a search needs")
         if not np.isfinite(self.begin).all():
-            raise InputError(f"{self.usual.name} has a field that is infinite or NaN; the search box needs finite values")
+            raise InputError(f"{self.usual.name} has an infinite or NaN field; the search box needs finite values")
         if not self.name:
             kind = type(self.usual)
             object.__setattr__(self, "name", f"{kind.__module__}:{kind.__qualname__}")

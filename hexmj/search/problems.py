@@ -51,11 +51,11 @@ class Problem:
     stride: Stride = field(default_factory=Stride)
     """Step range, lines along which the tips move, and time step."""
     acceleration: Acceleration | None = None
-    """Acceleration to the velocity by Eq. 11; None starts at the velocity."""
+    """Acceleration from V_r(0) to the velocity by Eq. 11; None walks at the velocity from time 0 on."""
     conditions: Conditions | None = None
     """Conditions of physical walks, in which falls count; None counts losses of stability in kinematic walks."""
     feedback: bool = False
-    """Whether candidates use sensory feedback, which needs physical walks."""
+    """Let candidates use sensory feedback, which needs physical walks."""
     over: Over = "usual"
     """Cost: FLSS with these settings (usual), or its mean or maximum over variants, each with one changed constant or
     rule that the paper does not print (mean, worst). Physical walks omit the variant AEP0 11, which is out of reach."""
@@ -131,7 +131,7 @@ class Sample:
 
     @cached_property
     def variants(self) -> "dict[str, Sample]":
-        """Samples of the same starts under each variant that `Problem.over` combines, by the variant's name."""
+        """Name of each variant -> sample of the same starts under it; `Problem.over` combines their costs."""
         problem = self.problem
         if problem.over == "usual":
             return {"usual": self}
@@ -187,7 +187,7 @@ class Sample:
         return (lost + np.mean(1.0 - np.minimum(times / ends, 1.0)).item()) / (self.n_starts + 1)
 
     def lost(self, cost: float) -> int | None:
-        """Return the number of starts that lost stability, or fell, from a cost; None for a mean over variants."""
+        """Return the number of lost or fallen starts from which a cost results; None for a mean over variants."""
         if self.problem.over == "mean":
             return None
         if self.problem.ties == "equal":

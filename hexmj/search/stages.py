@@ -36,7 +36,7 @@ class Effort:
     population: int = 10
     """Number of individuals in a generation, the paper's L."""
     domain: float = 10.0
-    """Range of the initial population, which the paper does not print: shifts [mm] and weights from 0 to D, neutral
+    """Range D of the initial population, which the paper does not print: shifts [mm] and weights from 0 to D, neutral
     positions [mm] from -D to D. Fields of another controller: from 0 to D times the default, or to D if the default is
     0."""
     begin: str | Controller | None = None
@@ -59,7 +59,7 @@ class Effort:
 
     def __post_init__(self) -> None:
         if choice("algorithm", self.algorithm, ("evolution", "cmaes")) == "cmaes" and find_spec("cmaes") is None:
-            raise without_extra("search", "cmaes, which the algorithm of this name needs,")
+            raise without_extra("search", "cmaes, which the algorithm 'cmaes' needs,")
         whole("population", self.population, 4 if self.algorithm == "cmaes" else 2)
         for name in ("starts", "refine_starts", "verdict_starts"):
             if (size := getattr(self, name)) is not None:
@@ -167,7 +167,7 @@ def search(
     course = history(evaluated, problem.form.names, problem.minimised)
     refused = list(filter(None, map(problem.refusal, course.candidate.values)))
     if reason := problem.refusal(best):
-        raise InputError(f"{len(refused)} of {len(course.cost)} candidates were refused, also the best: {reason}")
+        raise InputError(f"{len(refused)} of {len(course.cost)} candidates were refused, including the best: {reason}")
     last = list(samples.values())[-1]
     if cost >= REFUSED:
         last.check_walks(best, threads)
