@@ -13,7 +13,7 @@ from hexmj.files import read_toml
 from hexmj.paper.quantities import QUANTITIES, Estimate, Measured, Point, Quantity
 from hexmj.timing import OBSERVATION_TIMES
 
-TABLE = Path(__file__).with_name("claims.toml")  # all claims
+TABLE = Path(__file__).with_name("claims.toml")  # the claims and their rules
 
 LEVEL = 0.05
 """Significance level: two counts differ if p of Fisher's exact test is smaller."""

@@ -167,7 +167,7 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
     return figure, data
 
 
-Draw = Callable[[Measurements], "tuple[Figure, xr.Dataset]"]  # returns a figure and the data in it
+Draw = Callable[[Measurements], "tuple[Figure, xr.Dataset]"]  # draws a figure, returns it and its data
 
 FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
     **{

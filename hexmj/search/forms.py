@@ -1,8 +1,7 @@
 """Forms: the free parameters of a controller, which a search chooses, as a vector.
 
 A form of the 1998 network has nine or ten weights if all legs of a side are alike (Appendix A), 29 if only the two
-sides are alike (half of the 58 general weights of Section 2), or all 58. A form of another controller has its float
-fields.
+sides are alike (half of the 58 general weights of Section 2), or all 58. Other forms have a controller's float fields.
 """
 
 from dataclasses import dataclass, field, fields, replace

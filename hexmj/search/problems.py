@@ -51,7 +51,7 @@ class Problem:
     stride: Stride = field(default_factory=Stride)
     """Step range, lines along which the tips move, and time step."""
     acceleration: Acceleration | None = None
-    """Acceleration from V_r(0) to the velocity by Eq. 11; None walks at the velocity from time 0 on."""
+    """Accelerate from V_r(0) to the velocity by Eq. 11; by default, walk at the velocity from time 0 on."""
     conditions: Conditions | None = None
     """Conditions of physical walks, in which falls count; None counts losses of stability in kinematic walks."""
     feedback: bool = False

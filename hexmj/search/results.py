@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-FOUND = "found.toml"  # file of the found controller
+FOUND = "found.toml"  # name of the found controller's file
 
 EVALUATIONS = "evaluations"
 """Name of the directory of cached evaluations, which is inside the results directory."""

@@ -24,7 +24,7 @@ from hexmj.validate import choice, whole
 if TYPE_CHECKING:
     import xarray as xr
 
-STAGES: tuple[str, ...] = ("population", "simplex")  # in their order
+STAGES: tuple[str, ...] = ("population", "simplex")  # of a search, in this order
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def search(
 
         def costs(stage: str, candidates: np.ndarray) -> np.ndarray:
             result = np.empty(len(candidates))
-            size = 1 if problem.conditions else len(candidates)  # cache each physical cost at once, as walks take long
+            size = 1 if problem.conditions else len(candidates)  # physical walks are slow: cache each cost at once
             for i in range(0, len(candidates), size):
                 result[i : i + size] = cached[stage](candidates[i : i + size])
                 if advance:
