@@ -1,4 +1,4 @@
-"""Baseline controllers from the literature, each in a file of its own; all lift their legs with `lifted`."""
+"""Baseline controllers from the literature, one per file; all are built on the base class in `lifted`."""
 
 from hexmj.controllers.baselines.evolved import EVOLVED
 from hexmj.controllers.baselines.metronomes import Metronome
@@ -26,4 +26,4 @@ BASELINES: dict[str, Controller] = {
         EVOLVED,
     )
 }
-"""All baselines by name."""
+"""Name -> baseline controller."""

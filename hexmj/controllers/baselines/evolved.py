@@ -1,19 +1,19 @@
-"""Evolved: a small neural network lifts the legs, in the way of Beer & Gallagher (1992).
+"""A small evolved neural network that lifts the legs, after Beer & Gallagher (1992).
 
 Each leg has a continuous-time neuron, whose potential is y_i and whose output is s(y_i + theta):
 
     tau dy_i/dt = -y_i + sum_j w_ij s(y_j + theta) + I_i,    s(z) = 1 / (1 + exp(-GAIN z))
 
-When its output rises through 1/2, the neuron lifts the leg. As in the source, neurons are connected to those of
-neighbouring legs, sense the position of their own leg, and have the same constants in every leg; an evolutionary search
-chooses the constants by walks from random starts. Unlike the source, a leg has one neuron and not five, since the swing
-is given; the weights along the body have a direction; and V_r is an input, since one network walks at every velocity.
-We know the source from the paper of 1998 and from code by others, not from its own paper.
+When its output rises above 1/2, the neuron lifts the leg. As in the source, each neuron receives the outputs of the
+neighbouring legs' neurons and the position of its own leg, and all legs have the same constants, which an evolutionary
+search chooses by walks from random starts. Unlike the source, a leg has one neuron instead of five, since the swing is
+given; the leg behind and the leg in front have different weights; and V_r is an input, so that one network walks at
+every velocity. We know the source from the paper of 1998 and from code by others, not from its own text.
 
 Mapping: a leg's position is 0 at AEP_0 and 1 at PEP_0. Sensed: the own leg's position, and V_r. Fitted by us: all eight
-constants, on falls of our insect at V = 0.3 to 0.7 (`evolved.toml`, with the command), beginning with uncoupled legs.
-The result is a tripod with steps of 12 mm instead of 20 (at V = 0.5). At these velocities it falls less often than
-LDVS; in kinematic walks it loses stability more often than LDVS up to V = 0.3.
+constants, by a search for few falls of our insect at V = 0.3 to 0.7 that began with uncoupled legs (`evolved.toml`).
+The result is a tripod with steps of 12 mm instead of 20 mm (at V = 0.5). At these velocities it falls less often than
+LDVS; in kinematic walks up to V = 0.3 it loses static stability more often than LDVS.
 """
 
 from dataclasses import dataclass
@@ -26,33 +26,33 @@ from hexmj.files import read_toml
 from hexmj.legs import MIRROR, N2, N4
 
 FOUND = Path(__file__).with_name("evolved.toml")
-"""The constants that the search found, as it wrote them."""
+"""File of the constants, as the search wrote it."""
 
 GAIN = 8.0
-"""Steepness of s; weights, biases and inputs are divided by it, so that their usual size is 1."""
+"""Steepness of s; the fields below are weights, biases and inputs divided by it, so that their typical size is 1."""
 
 TAU = 2.0
-"""Unit of the time constant [time units]; a swing from PEP_0 to AEP_0 takes 20."""
+"""Unit of the neuron's time constant [time units]; a swing from PEP_0 to AEP_0 takes 20 time units."""
 
 
 @dataclass(frozen=True)
 class Evolved(Lifted):
-    """The equation; by default a leg is lifted soon after PEP_0, independently of the others."""
+    """One neuron per leg; by default each leg is lifted soon after PEP_0, independently of the other legs."""
 
     theta: float = -1.0
-    """Bias."""
+    """Bias of the neuron."""
     tau: float = 0.0
-    """log2 of the time constant in `TAU`."""
+    """Logarithm to base 2 of the time constant in units of `TAU`."""
     position: float = 1.0
-    """Input from a leg at PEP_0."""
+    """Input to the neuron while its leg is at PEP_0."""
     velocity: float = 0.0
-    """Input at V_r = V_p."""
+    """Input to the neuron at V_r = V_p."""
     own: float = 0.0
-    """Weight of the neuron's own output."""
+    """Weight of the neuron's own output in its input."""
     behind: float = 0.0
-    """Weight of the output of the leg behind."""
+    """Weight of the output of the ipsilateral leg behind."""
     ahead: float = 0.0
-    """Weight of the output of the leg in front."""
+    """Weight of the output of the ipsilateral leg in front."""
     across: float = 0.0
     """Weight of the output of the contralateral leg."""
     name: str = "evolved"
@@ -60,12 +60,12 @@ class Evolved(Lifted):
     mirrored = True
 
     def at_start(self, legs: Legs) -> np.ndarray:
-        """See `Lifted`: all potentials, (start, leg), are 0."""
+        """See `Lifted.at_start`: all potentials, (start, leg), are 0."""
         return np.zeros_like(legs.x)
 
     def lifts(self, state: np.ndarray, legs: Legs) -> tuple[np.ndarray, np.ndarray]:
-        """See `Lifted`: the equation, solved exactly for outputs and inputs that are constant over the step."""
-        with np.errstate(over="ignore", divide="ignore"):  # there an exponential is 0 or 1
+        """See `Lifted.lifts`: solves the equation exactly for outputs and inputs that are constant over the step."""
+        with np.errstate(over="ignore", divide="ignore"):  # the limits 0 and 1 are right
             decay = np.exp(-legs.stride.dt / (TAU * np.float64(2.0) ** self.tau))
             sent = 1.0 / (1.0 + np.exp(-GAIN * (state + self.theta)))
         drive = (
@@ -81,4 +81,4 @@ class Evolved(Lifted):
 
 
 EVOLVED = Evolved(**read_toml(FOUND)["fields"])
-"""The network with the constants that the search found."""
+"""The baseline `evolved`: the network with the constants that the search found."""

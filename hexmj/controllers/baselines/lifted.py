@@ -1,7 +1,7 @@
-"""Six legs that a rule lifts: the common part of all baselines, which differ only in when legs are lifted.
+"""The common part of all baselines, which differ only in the rule that decides when a leg is lifted.
 
-A standing tip recedes at V_r and a swinging one moves ahead at V_p. A swing ends at AEP_0; it begins when the rule says
-so, and at PEP_min at the latest, beyond which no leg reaches. So V, V_p, AEP_0 and PEP_min mean the same as for the
+A standing tip recedes at V_r, a swinging tip moves ahead at V_p. A swing ends at AEP_0; it begins when the rule lifts
+the leg, at the latest at PEP_min, the end of the leg's reach. So V, V_p, AEP_0 and PEP_min mean the same as for the
 1998 network, and every baseline walks from the same random starts.
 """
 
@@ -17,41 +17,41 @@ from hexmj.timing import AT_SPEED, Stride, commanded_velocities
 from hexmj.validate import choice, number
 
 MOST = 1.7e308
-"""Greatest finite number that a field may have."""
+"""Maximum magnitude of a field of the type float."""
 
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """The legs at the end of a step, as a rule knows them."""
+    """The legs at the end of a step: all that a rule can use."""
 
     x: np.ndarray
     """(start, leg) tips on their own axes [mm]."""
     stands: np.ndarray
-    """(start, leg) which legs stand."""
+    """(start, leg) True for legs that stand."""
     load: np.ndarray
-    """(start, leg) share of the weight on each foot: in a kinematic walk equal on all that stand, in a physical one
-    measured."""
+    """(start, leg) share of the weight on each foot: equal for all standing feet in a kinematic walk, measured in a
+    physical walk."""
     v: np.ndarray
-    """(start, 1) V_r."""
+    """(start, 1) V_r during the step."""
     stride: Stride
     """Step range, lines of the tips and time step."""
 
     @property
     def travel(self) -> np.ndarray:
-        """(start, leg) distance of the tips behind AEP_0, as a fraction of AEP_0 - PEP_0: 1 at PEP_0."""
+        """(start, leg) distance of the tips behind AEP_0 as a fraction of AEP_0 - PEP_0: 0 at AEP_0, 1 at PEP_0."""
         return (self.stride.aep0 - self.x) / (self.stride.aep0 - self.stride.pep0)
 
     @property
     def stance_part(self) -> np.ndarray:
-        """(start, 1) fraction of the period (AEP_0 - PEP_0) (1 + 1/V) for which a leg stands: 1 / (1 + V)."""
+        """(start, 1) duty factor 1 / (1 + V): fraction of the period (AEP_0 - PEP_0) (1 + 1/V) when a leg stands."""
         return 1.0 / (1.0 + self.v)
 
 
 class LiftedPlan(StepwisePlan):
-    """A `protocol.SteerablePlan` whose legs a rule lifts; a `protocol.FeedbackPlan` if the rule reads the load."""
+    """A `protocol.SteerablePlan` whose legs a rule lifts; also a `protocol.FeedbackPlan` if the rule uses the load."""
 
     def __init__(self, rule: "Lifted", starts, velocity, stride, acceleration, age=0) -> None:
-        """Begin at time 0, see `protocol.Controller.begin`; an acceleration began `age` steps earlier."""
+        """Begin at time 0, see `protocol.Controller.begin`, with an acceleration that began `age` steps before."""
         x = checked_starts(starts, stride)
         v = checked_velocities(velocity, len(x), acceleration)
         super().__init__(self._step, x, v, stride, acceleration, np.full(len(x), age))
@@ -87,7 +87,7 @@ class LiftedPlan(StepwisePlan):
         self.age = np.where(which, 0, self.age)
 
     def _at_rest(self, tips: np.ndarray) -> Legs:
-        """Return legs that all stand and carry equal parts of the weight."""
+        """Return legs that all stand at `tips` and carry equal shares of the weight."""
         v = commanded_velocities(self.velocity, self.age, 1, self.stride, self.acceleration)[0]
         stands = np.ones(tips.shape, dtype=bool)
         return Legs(tips, stands, _equal_parts(stands), v[:, None], self.stride)
@@ -103,23 +103,23 @@ class LiftedPlan(StepwisePlan):
         return Step(self._legs.x, self._legs.stands)
 
     def _feel(self, sensed: Sensed) -> None:
-        """Receive the loads; a start whose feet are all in the air has none."""
-        pressed = np.maximum(sensed.load, 0.0)  # a foot that pulls and is held by adhesion carries no weight
+        """Receive the sensed loads as shares of the weight; all are 0 if all feet of a start are in the air."""
+        pressed = np.maximum(sensed.load, 0.0)  # a foot that pulls carries no weight
         total = pressed.sum(axis=1, keepdims=True)
         self._felt[sensed.ids] = np.divide(pressed, total, out=np.zeros_like(pressed), where=total > 0)
 
 
 class Lifted:
-    """Base class of controllers that only decide which legs are lifted; makes them a `protocol.SteerableController`.
+    """Base class that makes a `protocol.SteerableController` of a rule that decides which legs are lifted.
 
-    A rule treats every start independently and changes none of its arguments.
+    A rule, `at_start` and `lifts`, treats every start independently and does not change its arguments.
     """
 
     reads_load = False
-    """Whether the rule uses the load; nothing else is sensed."""
+    """Whether the rule uses the load on the feet, the only sense that rules can have."""
 
     def __post_init__(self) -> None:
-        """Validate floats and `Literal`s of the frozen dataclass."""
+        """Validate the fields of the dataclass that are floats or `Literal`s."""
         for name, kind in get_type_hints(type(self)).items():
             if kind is float:
                 object.__setattr__(self, name, number(name, getattr(self, name), -MOST, MOST))
@@ -131,7 +131,7 @@ class Lifted:
         raise NotImplementedError
 
     def lifts(self, state: Any, legs: Legs) -> tuple[Any, np.ndarray]:
-        """Return the state after the step that moved the legs, and which legs are lifted now, (start, leg) of bool."""
+        """Return the state after the step, and which legs are lifted at its end, (start, leg) of bool."""
         raise NotImplementedError
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> LiftedPlan:
@@ -144,7 +144,7 @@ class Lifted:
 
 
 def from_neighbour(table: tuple[tuple[int, ...], ...], values: np.ndarray) -> np.ndarray:
-    """Return the value of each leg's only neighbour in a table, `legs.N2` or `legs.N4`, (start, leg); 0 without one."""
+    """Return the value of each leg's neighbour in `legs.N2` or `legs.N4`, (start, leg); 0 without a neighbour."""
     received = np.zeros(values.shape)
     for leg, near in enumerate(table):
         for neighbour in near:
@@ -153,17 +153,17 @@ def from_neighbour(table: tuple[tuple[int, ...], ...], values: np.ndarray) -> np
 
 
 def sum_of_legs(values: np.ndarray) -> np.ndarray:
-    """Return the sum over legs, (..., leg) to (...), side by side, so that mirrored starts give mirrored bits."""
+    """Return the sum over the last axis, leg; it sums each side first, so that mirrored starts give mirrored bits."""
     return (values[..., 0] + values[..., 1] + values[..., 2]) + (values[..., 3] + values[..., 4] + values[..., 5])
 
 
 def _equal_parts(stands: np.ndarray) -> np.ndarray:
-    """Return the share of the weight on each foot if all standing feet carry the same; 0 where none stands."""
+    """Return the share of the weight on each foot if all standing feet carry the same; 0 if no foot stands."""
     return stands / np.maximum(stands.sum(axis=1, keepdims=True), 1)
 
 
 def _chosen(which: np.ndarray, chosen: Any, other: Any) -> Any:
-    """Return `chosen` for the starts in `which`, (start,), and `other` elsewhere, in arrays or named tuples of them."""
+    """Return `chosen` where `which`, (start,), is True, else `other`; both are arrays or named tuples of arrays."""
     if isinstance(chosen, tuple):
         return type(chosen)(*(_chosen(which, *pair) for pair in zip(chosen, other, strict=True)))
     return np.where(which.reshape(-1, *[1] * (chosen.ndim - 1)), chosen, other)

@@ -1,12 +1,12 @@
 """Metronomes: a clock without sensory feedback lifts the legs, in two gaits of insects (paper, Section 5.3).
 
-Wilson's metachronal wave: on each side swings follow each other from hind to front without delay, and last as long at
-every velocity, so that each leg lags V / (1 + V) of a period behind the one behind it; the two sides move in
-anti-phase.  Graham's Gait I: the tripod at every velocity.
+Wilson's metachronal wave: on each side swings follow each other from hind to front without delay. A swing takes the
+same time at every velocity, so that each leg lags V / (1 + V) of a period behind the leg to its rear; the sides move
+in anti-phase.  Graham's Gait I: the tripod at every velocity.
 
 Mapping: the period is (AEP_0 - PEP_0) (1 + 1/V), in which a swing goes from PEP_0 to AEP_0 at V_p. Fitted by us:
-nothing. Sensed: nothing, not even the start; the clock is at 0 when the walk begins, and a leg whose swing is due then
-is lifted at once. From `ideal_start` every leg is in phase with the clock.
+nothing. Sensed: nothing, not even the tips at time 0. The clock is at 0 when the walk begins, and the first step lifts
+each leg whose swing has begun by then. From `ideal_start` every leg is in phase with the clock.
 """
 
 from dataclasses import dataclass
@@ -18,47 +18,47 @@ from hexmj.controllers.baselines.lifted import Legs, Lifted
 from hexmj.timing import Stride
 
 BEHIND = np.array([2.0, 1.0, 0.0, 2.0, 1.0, 0.0])
-"""Swings before a leg's own on its side, (leg,)."""
+"""(leg,) number of swings of the same side that precede the leg's swing."""
 
 RIGHT = np.array([0.0, 0.0, 0.0, 0.5, 0.5, 0.5])
-"""Lag of the right side [periods], (leg,)."""
+"""(leg,) lag of the right side behind the left side [periods]."""
 
 
 class Clock(NamedTuple):
     """State of a metronome."""
 
     time: np.ndarray
-    """(start, 1) [periods]."""
+    """(start, 1) time since the walk began [periods]."""
     swings: np.ndarray
-    """(start, leg) number of the last swing that began."""
+    """(start, leg) number of the swing that began last."""
 
 
 @dataclass(frozen=True)
 class Metronome(Lifted):
-    """A clock, and the lag of each leg behind it."""
+    """A clock that lifts each leg with a fixed lag."""
 
     wave: Literal["wilson", "graham"] = "wilson"
-    """Swings run from hind to front, or in two tripods."""
+    """Gait: 'wilson', swings from hind to front; 'graham', two tripods."""
     name: str = "wilson"
 
     def at_start(self, legs: Legs) -> Clock:
-        """See `Lifted`."""
+        """See `Lifted.at_start`."""
         phase = -self._lag(legs.v)
         swings = phase % 1.0 < _swing_part(legs.v)
         return Clock(np.zeros_like(legs.v), np.floor(phase) - swings)
 
     def lifts(self, state: Clock, legs: Legs) -> tuple[Clock, np.ndarray]:
-        """See `Lifted`."""
+        """See `Lifted.lifts`."""
         span = legs.stride.aep0 - legs.stride.pep0
         time = state.time + legs.stride.dt / span * _swing_part(legs.v)
         swings = np.floor(time - self._lag(legs.v))
         return Clock(time, np.maximum(swings, state.swings)), swings > state.swings
 
     def ideal_start(self, velocity: float, stride: Stride) -> np.ndarray:
-        """Return tips, (1, leg) [mm], in phase with the clock at time 0; a swinging leg is on the ground there."""
+        """Return the tips that are in phase with the clock at time 0, (1, leg) [mm]; swinging legs stand there too."""
         v = np.array([[velocity]])
         phase, swing = -self._lag(v) % 1.0, _swing_part(v)
-        part = np.where(phase < swing, phase / swing, (1.0 - phase) / (1.0 - swing))  # of the way from PEP_0 to AEP_0
+        part = np.where(phase < swing, phase / swing, (1.0 - phase) / (1.0 - swing))  # 0 at PEP_0, 1 at AEP_0
         return stride.pep0 + (stride.aep0 - stride.pep0) * part
 
     def _lag(self, v: np.ndarray) -> np.ndarray:
@@ -68,5 +68,5 @@ class Metronome(Lifted):
 
 
 def _swing_part(v: np.ndarray) -> np.ndarray:
-    """Return the fraction of the period for which a leg swings."""
+    """Return the fraction of the period in which a leg swings, at V_r."""
     return v / (1.0 + v)

@@ -1,19 +1,19 @@
-"""Walknet: six leg controllers that shift each other's PEP (rules of Cruse 1990), in two published versions.
+"""Walknet: legs that shift each other's PEP by the rules of Cruse (1990), with the constants of two published versions.
 
-A leg is lifted when x < PEP_i, PEP_i = PEP_0 + the sum of what its neighbours send it, and at least `least_step` behind
-AEP_0.  Rule 1: while a leg swings, and for a while after its touchdown, its neighbours swing later.  Rule 2: some time
-after its touchdown they swing earlier.  Rule 3: so do they while it passes a stretch of its own stance.  Rule 5: the
-more weight a leg carries, the later its neighbours swing.
+A leg is lifted when x < PEP_i. PEP_i is PEP_0 plus the shifts that its neighbours send, at least `least_step` behind
+AEP_0.  Rule 1: while a leg swings, and for a time after its touchdown, its neighbours swing later.  Rule 2: in an
+interval after a leg's touchdown, its neighbours swing earlier.  Rule 3: while a standing leg is within a part of its
+stance, its neighbours swing earlier.  Rule 5: the more weight a leg carries, the later its neighbours swing.
 
-Sources, of which only equations and constants are taken: `CURVE` is github.com/jsimmering/walknet-curvewalking
-(single_leg_controller.py, SingleLeg.py, RobotSettings.py), with its PEP a line across the body's axis as in the
-original Walknet; `REACOG` is github.com/malteschilling/cognitiveWalker (WalknetSettings.py, CoordinationRules.py);
-rule 5's weights are those of github.com/hcruse/neuro_walknet (NeuroWNSettings.py), since neither of the two has it.
+Only equations and constants come from the sources: `CURVE` from github.com/jsimmering/walknet-curvewalking
+(single_leg_controller.py, SingleLeg.py, RobotSettings.py), with the PEP as a line across the body axis as in the
+original Walknet; `REACOG` from github.com/malteschilling/cognitiveWalker (WalknetSettings.py, CoordinationRules.py);
+the weights of rule 5, which both lack, from github.com/hcruse/neuro_walknet (NeuroWNSettings.py).
 
-Mapping: the step length is AEP_0 - PEP_0, the swing velocity V_p; so v = V * `swing_speed`, and a second is as
-long as a swing of `swing_speed` / `step_length` step lengths.  Sensed: the own tip, and of the neighbours the tip,
-whether they swing, and for rule 5 their load.  Every leg acts on what all did at the same step; `CURVE` asks its legs
-one after the other.
+Mapping: the step length is AEP_0 - PEP_0, the swing velocity V_p. The source's velocity is v = V * `swing_speed`, and
+a second is the duration of a swing over `swing_speed` / `step_length` step lengths. Sensed: the own tip; the tip,
+the state and (for rule 5) the load of the neighbours.  All legs are updated at once; the code of `CURVE` updates one
+leg after the other.
 
 Chosen by us, since the sources do not say: the `swing_speed` of `CURVE`, and how rule 5 shifts PEP, see `sent_load`.
 """
@@ -27,34 +27,34 @@ from hexmj.errors import InputError
 from hexmj.legs import MIRROR, N2, N4
 
 OfPairs = tuple[float, float, float]
-"""Values for front, middle and hind legs, left and right alike."""
+"""Values for the front, middle and hind legs, the same for left and right."""
 
 
 @dataclass(frozen=True)
 class Links:
-    """Shifts of PEP by the receiver's place [step lengths]; above 0 its swing begins earlier."""
+    """Shifts of PEP for front, middle and hind receivers [step lengths]; above 0 the swing begins earlier."""
 
     behind: OfPairs = (0.0, 0.0, 0.0)
-    """From the ipsilateral leg behind."""
+    """Shifts sent by the ipsilateral leg behind."""
     ahead: OfPairs = (0.0, 0.0, 0.0)
-    """From the ipsilateral leg ahead."""
+    """Shifts sent by the ipsilateral leg ahead."""
     across: OfPairs = (0.0, 0.0, 0.0)
-    """From the contralateral leg."""
+    """Shifts sent by the contralateral leg."""
 
     def shift(self, sent: np.ndarray) -> np.ndarray:
-        """Return each leg's shift, (start, leg) [step lengths], by `sent`, (start, leg), at most 1."""
+        """Return each leg's shift, (start, leg) [step lengths]; `sent` is the strength of each sender, at most 1."""
         behind, ahead, across = (np.array(2 * values) for values in (self.behind, self.ahead, self.across))
         return from_neighbour(N2, sent) * behind + from_neighbour(N4, sent) * ahead + sent[:, MIRROR] * across
 
 
 @dataclass(frozen=True)
 class Lines:
-    """A value that depends on the velocity, straight between knots and level beyond them."""
+    """A piecewise linear function of the velocity, constant beyond its first and last knot."""
 
     v: tuple[float, ...]
-    """Of the knots [m/s]."""
+    """Velocities of the knots [m/s]."""
     value: tuple[float, ...]
-    """At the knots."""
+    """Values at the knots."""
 
     def at(self, v: np.ndarray) -> np.ndarray:
         """Return the value at v [m/s]."""
@@ -63,12 +63,12 @@ class Lines:
 
 @dataclass(frozen=True)
 class Logistic:
-    """1 / (1 + exp(steepness (v - middle)))."""
+    """The logistic function 1 / (1 + exp(steepness (v - middle))) of the velocity v."""
 
     steepness: float
-    """[s/m]."""
+    """Steepness [s/m]."""
     middle: float
-    """[m/s]."""
+    """Velocity at which the value is 1/2 [m/s]."""
 
     def at(self, v: np.ndarray) -> np.ndarray:
         """Return the value at v [m/s]."""
@@ -77,36 +77,36 @@ class Logistic:
 
 @dataclass(frozen=True)
 class Constants:
-    """The constants of a published Walknet."""
+    """The constants of a published Walknet; the sender is the leg that acts on the PEP of a neighbour."""
 
     step_length: float
-    """AEP - PEP without influences [m]."""
+    """Distance from PEP to AEP without influences [m]."""
     swing_speed: float
-    """At which a foot goes ahead in swing [m/s]."""
+    """Speed of a foot in swing [m/s]."""
     rule1: Links
-    """While the sender swings."""
+    """Rule 1: shifts of PEP while the sender swings."""
     rule1_rest: float
-    """Part of rule 1 that lasts after the sender's touchdown ..."""
+    """Fraction of the shifts of rule 1 that stays for `rule1_delay` after the sender's touchdown."""
     rule1_delay: Lines
-    """... and for how long [s]."""
+    """Time after the sender's touchdown in which rule 1 still acts [s]."""
     rule2: Links
-    """Some time after the sender's touchdown."""
+    """Rule 2: shifts of PEP in `rule2_window`."""
     rule2_window: tuple[float, float]
-    """From when until when [s]."""
+    """Begin and end of rule 2, after the sender's touchdown [s]."""
     rule3_along: Links
-    """Ipsilateral, while the sender stands within a stretch ..."""
+    """Rule 3: shifts of the ipsilateral neighbours' PEP while the sender stands in a part of its stance."""
     rule3_along_from: Lines | Logistic
-    """... that begins so far behind its AEP ..."""
+    """Begin of this part: distance behind the sender's AEP [step lengths]."""
     rule3_along_for: float
-    """... and is so long, both [step lengths]."""
+    """Length of this part [step lengths]."""
     rule3_across: Links
-    """Contralateral, the same ..."""
+    """Rule 3: shifts of the contralateral leg's PEP while the sender stands in another part of its stance."""
     rule3_across_from: Lines
-    """... from here ..."""
+    """Begin of that part: distance behind the sender's AEP [step lengths]."""
     rule3_across_for: float
-    """... on for so long, both [step lengths]."""
+    """Length of that part [step lengths]."""
     least_step: float
-    """How far behind AEP every PEP stays [step lengths]."""
+    """Minimum distance of every shifted PEP behind AEP [step lengths]."""
 
 
 CURVE = Constants(
@@ -125,14 +125,14 @@ CURVE = Constants(
     rule3_across_for=0.008 / 0.08,
     least_step=1.0 / 6.0,
 )
-"""walknet-curvewalking.
+"""Constants of walknet-curvewalking.
 
-Its feet lag behind a target that keeps 1.2 m/s / 50 Hz ahead of them, and how long a swing takes is not printed.  Taken
-is the speed at which rule 1 has no delay left, the fastest that its rules know.
+Its feet lag behind a target that moves 1.2 m/s / 50 Hz ahead of them; the duration of a swing is not published.  We use
+as `swing_speed` the speed at which the delay of rule 1 becomes 0, the highest speed in its rules.
 """
 
 M = 1.0 / 0.16
-"""A metre in step lengths of `REACOG`."""
+"""Step lengths of `REACOG` per metre."""
 
 REACOG = Constants(
     step_length=0.16,
@@ -152,36 +152,36 @@ REACOG = Constants(
     rule3_across_for=0.03 * M,
     least_step=0.05 * M,
 )
-"""reaCog.  Having no rule 5, it lets rule 1 act on hind legs too.
+"""Constants of reaCog, which has no rule 5; its rule 1 acts on hind legs too.
 
-A stretch of rule 3 begins 0.236 + 2 v (0.079 + 4 v up to 0.01 m/s) or 0.5 + 6 v of the way ahead of PEP, and goes to
-the rear.  A foot takes 0.296 m / (0.28 m/s) from PEP over the highest point to AEP, 0.16 m ahead.
+The part of rule 3 begins 0.236 + 2 v (0.079 + 4 v up to 0.01 m/s), or contralaterally 0.5 + 6 v, of the step length
+ahead of PEP, and extends to the rear.  A swing of 0.16 m, over its highest point, takes 0.296 m / (0.28 m/s).
 """
 
 RULE5 = Links(behind=(-0.2, -0.2, 0.0), ahead=(0.0, -0.2, -0.2), across=(-0.1, -0.1, 0.0))
-"""R5i and R5c of neuro_walknet; R5ch, between hind legs, acts on swinging legs only."""
+"""Shifts of rule 5: R5i and R5c of neuro_walknet; R5ch, between hind legs, is left out: it acts only in swing."""
 
 
 def sent_load(load: np.ndarray) -> np.ndarray:
-    """Return what a leg sends by rule 5, 0 to 0.6, when it carries a fraction `load` of the weight.
+    """Return the strength, 0 to 0.6, with which a leg that carries a share `load` of the weight acts by rule 5.
 
-    In neuro_walknet the effort of the leg's retractor, 0 to 50 mV, less a threshold of 20 mV, strengthens the
-    retractors of its neighbours that stand.  Here a third of the weight, a leg's part in a tripod, is an effort of
-    50 mV, and the neighbour's stance is prolonged: 50 mV times a weight of 1 are a step length.
+    In neuro_walknet the effort of the leg's retractor, 0 to 50 mV, minus a threshold of 20 mV, strengthens the
+    retractors of standing neighbours.  Here a third of the weight, a leg's share in a tripod, equals an effort of
+    50 mV, and the effect prolongs the neighbour's stance: 50 mV times a weight of 1 equals one step length.
     """
     return np.maximum(np.minimum(3.0 * load, 1.0) - 20.0 / 50.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Walknet(Lifted):
-    """Legs that shift each other's PEP."""
+    """Legs that shift each other's PEP by the rules 1, 2, 3 and 5."""
 
     name: str = "walknet"
     constants: Constants = CURVE
     rules: tuple[int, ...] = (1, 2, 3)
-    """Rules that act, of 1, 2, 3 and 5."""
+    """Rules that act, some of 1, 2, 3 and 5."""
     veto: bool = False
-    """Whether no leg is lifted while three or more swing, as in `CURVE`; several may be lifted in one step."""
+    """Whether no leg is lifted while three or more legs swing, as in `CURVE`; one step may lift several legs."""
 
     mirrored = True
 
@@ -191,27 +191,27 @@ class Walknet(Lifted):
 
     @property
     def reads_load(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Rule 5 does."""
+        """Whether rule 5 acts, the only rule that uses the load."""
         return 5 in self.rules
 
     def without(self, rule: int) -> "Walknet":
-        """Return the controller without a rule, with a name that says so.
+        """Return the controller without a rule; its name ends with ``-without-N``.
 
         Raises:
-            InputError: the rule does not act.
+            InputError: the controller does not have this rule.
         """
         if rule not in self.rules:
-            raise InputError(f"{self.name} without rule {rule}; expected one of {', '.join(map(str, self.rules))}")
+            raise InputError(f"{self.name} has no rule {rule}; expected one of {', '.join(map(str, self.rules))}")
         return replace(self, name=f"{self.name}-without-{rule}", rules=tuple(r for r in self.rules if r != rule))
 
     def at_start(self, legs: Legs) -> np.ndarray:
-        """See `Lifted`: times since touchdown, (start, leg) [time units]; infinite where there was none."""
+        """See `Lifted.at_start`: time since touchdown, (start, leg) [time units]; infinite before the first one."""
         return np.full(legs.x.shape, np.inf)
 
     def lifts(self, state: np.ndarray, legs: Legs) -> tuple[np.ndarray, np.ndarray]:
-        """See `Lifted`."""
+        """See `Lifted.lifts`."""
         dt, span = legs.stride.dt, legs.stride.aep0 - legs.stride.pep0
-        age = np.where(legs.stands, state + dt, -dt)  # 0 at the step of touchdown
+        age = np.where(legs.stands, state + dt, -dt)  # time in stance: 0 at the step of touchdown
         shift = sum((self.shift(rule, legs, age) for rule in self.rules), np.zeros(legs.x.shape))
         pep = np.minimum(legs.stride.pep0 + span * shift, legs.stride.aep0 - span * self.constants.least_step)
         lifted = legs.stands & (legs.x < pep)
@@ -220,7 +220,7 @@ class Walknet(Lifted):
         return age, lifted
 
     def shift(self, rule: int, legs: Legs, age: np.ndarray) -> np.ndarray:
-        """Return the shift of each leg's PEP by a rule, (start, leg) [step lengths]; `age` is that of the stances."""
+        """Return the shift of each leg's PEP by a rule, (start, leg) [step lengths]; `age` is the time in stance."""
         own, v = self.constants, legs.v * self.constants.swing_speed
         second = own.swing_speed / own.step_length * (legs.stride.aep0 - legs.stride.pep0)  # [time units]
         match rule:
@@ -239,5 +239,5 @@ class Walknet(Lifted):
 
 
 def _within(legs: Legs, begin: np.ndarray, length: float) -> np.ndarray:
-    """Return which legs stand in a stretch of the stance, by its begin behind AEP_0 and length, (start, leg)."""
+    """Return which legs stand in a part of the stance, (start, leg), given its begin behind AEP_0 and its length."""
     return legs.stands & (legs.travel > begin) & (legs.travel < begin + length)
