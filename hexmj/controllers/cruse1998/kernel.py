@@ -1,13 +1,13 @@
-"""The compiled kernel of the network: many starts side by side, Eq. 1-6 and 11, and static stability.
+"""The compiled kernel of the network: Eq. 1-6 and 11 and static stability, for many starts side by side.
 
-`LANES` starts lie side by side in a block, one row of lanes for each variable of each leg.  A step takes
-every lane through the same operations without a branch, all six legs in one pass, so that the compiler
-fills the vector units; weights and constants come as tuples, whose numbers it keeps in registers.  A lane
-that has its answer gets the next start, so blocks stay full.  No multiplication is fused with an addition:
-``tests/plain_network.py`` holds the same equations in their readable form, and both agree to the last bit.
+A block holds `LANES` starts, one per lane, and has one row of lanes for each variable of each leg.  A step applies
+the same operations to every lane, without a branch and to all six legs in one pass, so that the compiler uses vector
+instructions; weights and constants are tuples, whose numbers it keeps in registers.  When the first loss of a start
+is known, its lane takes the next start, so that blocks stay full.  No multiplication is fused with an addition:
+``tests/plain_network.py`` holds the same equations in readable form, and both agree to the last bit.
 
-Measured on one core of an AMD EPYC (Zen 5): 8 to 32 lanes are slower, 128 are a tenth faster, but take 42 kB, more
-than the first cache of many processors; the starts one after the other are five times slower (`make bench`).
+On one core of an AMD EPYC (Zen 5), 8 to 32 lanes are slower; 128 lanes are 10 % faster, but take 42 kB, more than
+the L1 cache of many processors; computing one start after the other is five times slower (`make bench`).
 """
 
 from typing import Any
@@ -21,57 +21,58 @@ LANES = 64
 PRINTED, UNDELAYED, SEQUENTIAL = range(3)
 ABOVE, BOTH, SUM = range(3)
 
-# A leg without the neighbour in question names itself, with weight 0.
+# Index of each leg's neighbour.  A leg without such a neighbour has its own index, and the weight is 0.
 REAR = tuple(n[0] if n else d for d, n in enumerate(N2))
 FRONT = tuple(n[0] if n else d for d, n in enumerate(N4))
 CONTRA = MIRROR
 
-# The six legs, and below the rows, are numbers of NumPy: numba compiles a function again for each literal.
+# Indices of legs and rows are NumPy integers: numba would compile a function again for each Python integer.
 L1, L2, L3, R1, R2, R3 = np.arange(6)
 
-# Rows of a block.  Six rows a variable, one for each leg: the tip x, the states s(t) and s(t - dt), AEP(t), and
-# the influences on PEP and AEP that the next step uses.
+# Rows of a block.  Six rows per variable, one for each leg: the tip x, the states s(t) and s(t - dt), AEP(t), and
+# the shifts of PEP and AEP that the next step uses.
 X, S, S_OLD, AEP, PEP_SHIFT, AEP_SHIFT = np.arange(0, 36, 6)
-# One row a variable: V_r(t) and its final value, steps to take and taken, the step of the first loss or 0.
+# One row per variable: V_r(t), final V_r, number of steps to search and of steps done, step of the first loss or 0.
 V, V_FINAL, STEPS, DONE, LOST = range(36, 41)
 ROWS = 41
 
-# The weights of each kind of neighbour: six numbers each, one for each destination.  P^2 comes times AEP_0 - PEP_min.
+# Indices into the weights `p`: six weights of each kind, one per destination.  P^2 is multiplied by AEP_0 - PEP_min.
 _P1_REAR, _P1_CONTRA, _P2_REAR, _P4_FRONT = range(0, 24, 6)
 _P31_FRONT, _P32_FRONT, _P33_FRONT, _P34_FRONT = range(24, 48, 6)
 _P31_CONTRA, _P32_CONTRA, _P33_CONTRA, _P34_CONTRA = range(48, 72, 6)
 
-# The constants: AEP_0, PEP_0, PEP_min, dt, V_r(0), a, the origins of the legs' axes, 1 / |y| of their lines.
+# Indices into the constants `k`: AEP_0, PEP_0, PEP_min, dt, V_r(0), a, six origins of axes, 1 / |y| of six lines.
 _AEP0, _PEP0, _PEP_MIN, _DT, _V_START, _RATE, _ORIGIN, _PER_Y = 0, 1, 2, 3, 4, 5, 6, 12
 
-# How the equations are read, see `network.Rules`: a choice is the length of a tuple, and so part of its type; each
-# combination is compiled by itself, and what another would do costs nothing.
+# Indices into `rules`, the choices of `network.Order` and `network.ModelVariant`.  A choice is the length of a tuple,
+# and so part of its type: numba compiles each combination separately, without branches for the other choices.
 _ORDER, _FRONT_LASTS, _CONTRA_LASTS, _CAP, _STRONGEST, _FINAL = range(6)
 
 
 @inlined
 def _influence(d, x, s, s_old, aep, v, p, k, rules):
-    """Eq. 2-5 for leg d: the sum of Delta^1, Delta^2 and Delta^3, and Delta^4; `v` is V_r of P^nr."""
+    """Return leg d's shifts of PEP (Delta^1 + Delta^2 + Delta^3) and AEP (Delta^4), Eq. 2-5; V_r in P^nr is `v`."""
     rear, contra, front = REAR[d], CONTRA[d], FRONT[d]
-    one, other = 0.0 if s[rear] == 1.0 else -p[_P1_REAR + d], 0.0 if s[contra] == 1.0 else -p[_P1_CONTRA + d]  # Eq. 2
-    pep = (one if abs(one) > abs(other) else other) if len(rules[_STRONGEST]) else one + other
+    rear1 = 0.0 if s[rear] == 1.0 else -p[_P1_REAR + d]  # Eq. 2
+    contra1 = 0.0 if s[contra] == 1.0 else -p[_P1_CONTRA + d]
+    pep = (rear1 if abs(rear1) > abs(contra1) else contra1) if len(rules[_STRONGEST]) else rear1 + contra1
     pep += p[_P2_REAR + d] if (s[rear] == 1.0) & (s_old[rear] == 0.0) else 0.0  # Eq. 3
-    ahead = p[_P31_FRONT + d] + p[_P34_FRONT + d] * v - x[front]
-    one = _capped((p[_P32_FRONT + d] if ahead >= 0.0 else p[_P33_FRONT + d]) * ahead, rules)
-    one = one if (s[front] == 1.0) | (len(rules[_FRONT_LASTS]) == 1) else 0.0  # Eq. 4
-    ahead = p[_P31_CONTRA + d] + p[_P34_CONTRA + d] * v - x[contra]
-    other = _capped((p[_P32_CONTRA + d] if ahead >= 0.0 else p[_P33_CONTRA + d]) * ahead, rules)
-    other = other if (s[contra] == 1.0) | (len(rules[_CONTRA_LASTS]) == 1) else 0.0  # Eq. 4
-    pep = pep + one + other
+    behind = p[_P31_FRONT + d] + p[_P34_FRONT + d] * v - x[front]  # Eq. 4, down to the cap
+    front3 = _capped((p[_P32_FRONT + d] if behind >= 0.0 else p[_P33_FRONT + d]) * behind, rules)
+    front3 = front3 if (s[front] == 1.0) | (len(rules[_FRONT_LASTS]) == 1) else 0.0
+    behind = p[_P31_CONTRA + d] + p[_P34_CONTRA + d] * v - x[contra]
+    contra3 = _capped((p[_P32_CONTRA + d] if behind >= 0.0 else p[_P33_CONTRA + d]) * behind, rules)
+    contra3 = contra3 if (s[contra] == 1.0) | (len(rules[_CONTRA_LASTS]) == 1) else 0.0
+    pep = pep + front3 + contra3
     if len(rules[_CAP]) == SUM:
-        pep -= one + other - 4.0 if one + other > 4.0 else 0.0
+        pep -= front3 + contra3 - 4.0 if front3 + contra3 > 4.0 else 0.0
     crossed = k[_ORIGIN + d] + x[d] >= k[_ORIGIN + front] + x[front]
     return pep, (k[_PEP_MIN] - aep[d]) * p[_P4_FRONT + d] if crossed else 0.0  # Eq. 5
 
 
 @inlined
 def _capped(shift, rules):
-    """Eq. 4's bound of an influence of mechanism 3."""
+    """Return an influence of mechanism 3 with the limit of 4 mm of Eq. 4 that the choice ABOVE or BOTH sets."""
     if len(rules[_CAP]) != SUM:
         shift = shift if shift < 4.0 else 4.0
     if len(rules[_CAP]) == BOTH:
@@ -81,7 +82,7 @@ def _capped(shift, rules):
 
 @inlined
 def _move(x, s, pep_shift, aep_shift, v, k):
-    """Eq. 6 for one leg: its tip, state and AEP after the step."""
+    """Return the tip, state and AEP of one leg after the step, Eq. 6."""
     x += -v * k[_DT] if s == 1.0 else k[_DT]
     aep = k[_AEP0] + aep_shift
     pep = k[_PEP0] + pep_shift
@@ -93,7 +94,7 @@ def _move(x, s, pep_shift, aep_shift, v, k):
 
 @inlined
 def _influences(x, s, s_old, aep, v, p, k, rules):
-    """Eq. 2-5 for all legs: the shifts of PEP, and those of AEP."""
+    """Return the shifts of PEP and the shifts of AEP of all legs, Eq. 2-5."""
     pep0, aep0 = _influence(L1, x, s, s_old, aep, v, p, k, rules)
     pep1, aep1 = _influence(L2, x, s, s_old, aep, v, p, k, rules)
     pep2, aep2 = _influence(L3, x, s, s_old, aep, v, p, k, rules)
@@ -105,7 +106,7 @@ def _influences(x, s, s_old, aep, v, p, k, rules):
 
 @inlined
 def _moves(x, s, pep_shift, aep_shift, v, k):
-    """Eq. 6 for all legs at once."""
+    """Return the tips, states and AEPs of all legs after the step, Eq. 6."""
     x0, s0, aep0 = _move(x[0], s[0], pep_shift[0], aep_shift[0], v, k)
     x1, s1, aep1 = _move(x[1], s[1], pep_shift[1], aep_shift[1], v, k)
     x2, s2, aep2 = _move(x[2], s[2], pep_shift[2], aep_shift[2], v, k)
@@ -117,7 +118,7 @@ def _moves(x, s, pep_shift, aep_shift, v, k):
 
 @inlined
 def _move_in_turn(d, x, s, s_old, aep, v, v_neutral, p, k, rules):
-    """Eq. 2-6 for leg d, the legs before it having moved already."""
+    """Move leg d by Eq. 2-6, after the legs before it have moved."""
     pep_shift, aep_shift = _influence(d, x, s, s_old, aep, v_neutral, p, k, rules)
     x_d, s_d, aep_d = _move(x[d], s[d], pep_shift, aep_shift, v, k)
     return _put(x, d, x_d), _put(s, d, s_d), _put(s_old, d, s[d]), _put(aep, d, aep_d)
@@ -125,14 +126,14 @@ def _move_in_turn(d, x, s, s_old, aep, v, v_neutral, p, k, rules):
 
 @inlined
 def _put(six, d, value):
-    """Six numbers with the one of leg d replaced."""
+    """Return six numbers in which the number of leg d is replaced by `value`."""
     a, b, c = (value if d == 0 else six[0]), (value if d == 1 else six[1]), (value if d == 2 else six[2])
     return a, b, c, (value if d == 3 else six[3]), (value if d == 4 else six[4]), (value if d == 5 else six[5])
 
 
 @inlined
 def _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules):
-    """Eq. 2-6 leg after leg."""
+    """Move all legs by Eq. 2-6, one after the other."""
     x, s, s_old, aep = _move_in_turn(L1, x, s, s_old, aep, v, v_neutral, p, k, rules)
     x, s, s_old, aep = _move_in_turn(L2, x, s, s_old, aep, v, v_neutral, p, k, rules)
     x, s, s_old, aep = _move_in_turn(L3, x, s, s_old, aep, v, v_neutral, p, k, rules)
@@ -143,13 +144,14 @@ def _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules):
 
 @inlined
 def _stable(x, s, k):
-    """Whether the centre of mass lies strictly inside the support polygon.
+    """Return whether the centre of mass lies strictly inside the support polygon.
 
-    With u = x / |y| of the standing feet: if and only if both sides stand, max u left + max u right > 0
-    and min u left + min u right < 0.
+    With u = x / |y| of the standing feet, it does if and only if feet stand on both sides, max u left + max u right
+    > 0, and min u left + min u right < 0.
     """
-    u0, u1, u2 = (k[6] + x[0]) * k[12], (k[7] + x[1]) * k[13], (k[8] + x[2]) * k[14]
-    u3, u4, u5 = (k[9] + x[3]) * k[15], (k[10] + x[4]) * k[16], (k[11] + x[5]) * k[17]
+    o, w = k[_ORIGIN:_PER_Y], k[_PER_Y:]
+    u0, u1, u2 = (o[0] + x[0]) * w[0], (o[1] + x[1]) * w[1], (o[2] + x[2]) * w[2]
+    u3, u4, u5 = (o[3] + x[3]) * w[3], (o[4] + x[4]) * w[4], (o[5] + x[5]) * w[5]
     none = np.inf
     front = max(u0 if s[0] == 1.0 else -none, u1 if s[1] == 1.0 else -none, u2 if s[2] == 1.0 else -none)
     front += max(u3 if s[3] == 1.0 else -none, u4 if s[4] == 1.0 else -none, u5 if s[5] == 1.0 else -none)
@@ -160,7 +162,7 @@ def _stable(x, s, k):
 
 @inlined
 def _load(z, row, j):
-    """The six legs' numbers of lane j."""
+    """Return the six legs' numbers of a variable in lane j; `row` is the variable's first row."""
     at = row * LANES + j
     return (z[at], z[at + LANES], z[at + 2 * LANES], z[at + 3 * LANES], z[at + 4 * LANES], z[at + 5 * LANES])
 
@@ -174,13 +176,13 @@ def _store(z, row, j, six):
 
 @inlined
 def _neutral_velocity(z, j, rules):
-    """V_r of P^nr, in lane j."""
+    """Return the V_r in the neutral position P^nr, in lane j."""
     return z[(V_FINAL if len(rules[_FINAL]) else V) * LANES + j]
 
 
 @inlined
 def _finish(z, j, x, s, s_old, aep, v, k):
-    """Store a lane's legs after a step, note a first loss of static stability, and accelerate."""
+    """Store a lane's legs after a step, note a first loss of static stability, and update V_r."""
     _store(z, X, j, x)
     _store(z, S, j, s)
     _store(z, S_OLD, j, s_old)
@@ -195,7 +197,7 @@ def _finish(z, j, x, s, s_old, aep, v, k):
 
 @part
 def _step_printed(z, p, k, rules):
-    """One step of a block, all six legs at once, PEP(t + dt) from Delta(t)."""
+    """Advance a block by one step, all six legs at once, PEP(t + dt) from Delta(t)."""
     for j in range(LANES):
         x, s, s_old, aep = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j)
         v = z[V * LANES + j]
@@ -209,7 +211,7 @@ def _step_printed(z, p, k, rules):
 
 @part
 def _step_undelayed(z, p, k, rules):
-    """One step of a block, all six legs at once, PEP(t + dt) from Delta(t + dt)."""
+    """Advance a block by one step, all six legs at once, PEP(t + dt) from Delta(t + dt)."""
     for j in range(LANES):
         x, s, s_old, aep = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j)
         v = z[V * LANES + j]
@@ -221,7 +223,7 @@ def _step_undelayed(z, p, k, rules):
 
 @part
 def _step_sequential(z, p, k, rules):
-    """One step of a block, leg after leg."""
+    """Advance a block by one step, one leg after the other."""
     for j in range(LANES):
         x, s, s_old, aep = _load(z, X, j), _load(z, S, j), _load(z, S_OLD, j), _load(z, AEP, j)
         v = z[V * LANES + j]
@@ -254,30 +256,31 @@ def _begin(z, j, start, v, v_final, steps, k):
 
 @part
 def _block():
-    """A block whose rows begin where lines of the cache do; as memory comes, FLSS took up to 1.4 times as long."""
+    """Return a block aligned to the cache lines; without alignment, FLSS took up to 1.4 times as long."""
     z = np.zeros(ROWS * LANES + 7)
     return z[(64 - z.ctypes.data % 64) % 64 // 8 :]
 
 
 @jitted
 def first_losses(starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, rules: Any, lost: Any) -> None:
-    """Write the step of each start's first loss of static stability within its `steps`, or 0, to `lost`, (start,).
+    """Write each start's step of the first loss of static stability to `lost`, (start,); 0 if its `steps` have none.
 
-    `starts` is (start, leg), `v`, `v_final` and `steps` are (start,); `p`, `k` and `rules` are `network.Constants`.
+    `starts` is (start, leg), `v`, `v_final` and `steps` are (start,); `p`, `k` and `rules` are the parts of
+    `network.Constants`: weights, constants and choices.
     """
-    z, who = _block(), np.full(LANES, -1)  # which start is in each lane
+    z, start_in = _block(), np.full(LANES, -1)  # index of the start in each lane; -1 if the lane is empty
     following = undecided = 0
     while True:
         if undecided == 0 or (undecided < LANES and following < len(starts)):
             for j in range(LANES):
-                if not _undecided(z, j) and who[j] >= 0:
-                    lost[who[j]] = z[LOST * LANES + j]
-                    who[j] = -1
-                if who[j] < 0 and following < len(starts):
+                if not _undecided(z, j) and start_in[j] >= 0:
+                    lost[start_in[j]] = z[LOST * LANES + j]
+                    start_in[j] = -1
+                if start_in[j] < 0 and following < len(starts):
                     _begin(z, j, starts[following], v[following], v_final[following], steps[following], k)
-                    who[j] = following
+                    start_in[j] = following
                     following += 1
-        if who.max() < 0:
+        if start_in.max() < 0:
             return
         _step(z, rules[_ORDER], p, k, rules)
         undecided = 0
@@ -292,7 +295,7 @@ def _undecided(z, j):
 
 @jitted
 def begin_blocks(blocks: Any, starts: Any, v: Any, v_final: Any, k: Any) -> None:
-    """Put every start at time 0, (block, row of lanes); empty lanes at the end repeat the last start."""
+    """Write every start at time 0 to `blocks`, (block, row of lanes); spare lanes at the end repeat the last start."""
     for i in range(len(blocks) * LANES):
         n = min(i, len(starts) - 1)
         _begin(blocks[i // LANES], i % LANES, starts[n], v[n], v_final[n], 0.0, k)
@@ -300,7 +303,7 @@ def begin_blocks(blocks: Any, starts: Any, v: Any, v_final: Any, k: Any) -> None
 
 @jitted
 def record(blocks: Any, begin: int, end: int, p: Any, k: Any, rules: Any, velocity: Any, x: Any, stance: Any) -> None:
-    """Step blocks `begin` to `end` on; write V_r of each step, tips and states after it, (step, start, leg)."""
+    """Advance blocks `begin` to `end`; write each step's V_r, (step, start), tips and stance, (step, start, leg)."""
     steps, starts = velocity.shape
     for b in range(begin, end):
         z = blocks[b]
@@ -318,10 +321,10 @@ def record(blocks: Any, begin: int, end: int, p: Any, k: Any, rules: Any, veloci
 
 @jitted
 def lose(blocks: Any, begin: int, end: int, unseen: int, seen: int, p: Any, k: Any, rules: Any) -> None:
-    """Step blocks `begin` to `end` on; their rows `LOST` then hold the first losses after the `unseen` steps."""
+    """Advance blocks `begin` to `end`; their rows `LOST` then hold the first losses after the `unseen` steps."""
     for b in range(begin, end):
         z = blocks[b]
         for n in range(unseen + seen):
             if n == unseen:
-                z[STEPS * LANES : (STEPS + 1) * LANES] = z[DONE * LANES] + seen  # before, none counts
+                z[STEPS * LANES : (STEPS + 1) * LANES] = z[DONE * LANES] + seen  # losses count from here
             _step(z, rules[_ORDER], p, k, rules)

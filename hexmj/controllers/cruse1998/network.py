@@ -1,8 +1,8 @@
 """The coordination network of 1998 as a controller: Eq. 1-6 and 11 of the paper, for many starts at once.
 
-One step leads from the states at t to those at t + dt with V_r(t). A walk begins with Delta(0) = 0, AEP(0) = AEP_0 and
-s(-dt) = s(0): our conventions, where the paper is silent. The equations are in `kernel`, compiled;
-``tests/plain_network.py`` has them in a readable form.
+A step computes the legs at t + dt from the legs at t and V_r(t). We let a walk begin with Delta(0) = 0,
+AEP(0) = AEP_0 and s(-dt) = s(0), where the paper is silent. The module `kernel` holds the compiled equations,
+``tests/plain_network.py`` their readable form.
 """
 
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -26,33 +26,33 @@ Order = Literal["printed", "undelayed", "sequential"]
 """Orders in which the legs are updated, see `Cruse1998.order`; the kernel numbers them in this sequence."""
 
 Constants = tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[int, ...], ...]]
-"""Weights, constants and rules, as the kernel reads them: order of updates and choices of a model variant, each as a
-tuple whose length is the choice's number."""
+"""Arguments `p`, `k` and `rules` of the kernel: weights, constants, choices. The choices are the order of updates and
+the fields of a model variant; each is a tuple whose length is the number of the chosen value."""
 
 AT_ONCE = 200_000_000
-"""Most steps times starts in one call of the kernel: about two seconds, during which Ctrl-C has no effect."""
+"""Maximum of steps times starts in one call of the kernel: about two seconds, in which Ctrl-C has no effect."""
 
 
 @dataclass(frozen=True)
 class ModelVariant:
-    """How Section 2 is interpreted where its sentences and its equations allow more than one network.
+    """An interpretation of the paper's Section 2, of which text and equations allow more than one network.
 
-    The order of updates, a lag between legs, is `Cruse1998.order`.
+    The order in which the legs are updated is a separate field, `Cruse1998.order`.
     """
 
     ipsilateral: Literal["standing", "lasting"] = "standing"
-    """When the anterior leg acts on the PEP (Eq. 4): while it stands, as the factor s_e(t) has it, or all the time:
-    'the value of the influence depends on the position of the distal point of the influencing leg'."""
+    """When the anterior leg acts on the PEP (Eq. 4). 'standing': while it stands (factor s_e(t)). 'lasting': always, by
+    the text: 'the value of the influence depends on the position of the distal point of the influencing leg'."""
     contralateral: Literal["standing", "lasting"] = "standing"
-    """When the contralateral leg acts by mechanism 3, likewise."""
+    """When the contralateral leg acts by mechanism 3: while it stands ('standing') or always ('lasting')."""
     cap: Literal["above", "both", "sum"] = "above"
-    """What the 4 mm of Eq. 4 bound: each influence from above, as printed; each between -4 and 4; or the sum over N^3
-    ('the influences of the anterior and contralateral legs') from above."""
+    """What the 4 mm of Eq. 4 limit. 'above': each influence to at most 4 mm, as printed. 'both': each to -4 to 4 mm.
+    'sum': the sum over N^3 ('the influences of the anterior and contralateral legs') to at most 4 mm."""
     rear: Literal["sum", "strongest"] = "sum"
-    """What mechanism 1 amounts to where two legs act ('the effects ... come from the ipsilateral rear leg (if it
-    exists) and the contralateral one'): the sum, as Eq. 6 has it, or the strongest."""
+    """How mechanism 1 combines two legs that act ('the effects ... come from the ipsilateral rear leg (if it exists)
+    and the contralateral one'). 'sum': their sum, as in Eq. 6. 'strongest': only the larger of the two."""
     neutral: Literal["present", "final"] = "present"
-    """Which V_r moves the neutral position P^nr while the insect accelerates: that of Eq. 6, or the desired V_r*."""
+    """V_r that determines the neutral position P^nr while accelerating: 'present' V_r (Eq. 6) or 'final' V_r*."""
 
     def __post_init__(self) -> None:
         for name, hint in get_type_hints(ModelVariant).items():
@@ -60,16 +60,16 @@ class ModelVariant:
 
 
 MODEL_VARIANTS = {"printed": ModelVariant(), "lasting": ModelVariant(ipsilateral="lasting")}
-"""Model variants by name: as printed, and with the anterior leg's influence lasting while that leg protracts."""
+"""Model variants by name: 'printed', and 'lasting', in which the anterior leg also acts while it protracts."""
 
 
 def named_variant(name: str) -> ModelVariant:
-    """Return a model variant by its name."""
+    """Return a model variant by its name; raise InputError if there is no such name."""
     return MODEL_VARIANTS[choice("model_variant", name, MODEL_VARIANTS)]
 
 
 def variant_name(model_variant: ModelVariant) -> str:
-    """Return the name of a model variant, or its choices that are not as printed, such as 'cap sum, neutral final'."""
+    """Return a model variant's name, or the choices that differ from 'printed', such as 'cap sum, neutral final'."""
     for name, named in MODEL_VARIANTS.items():
         if named == model_variant:
             return name
@@ -84,12 +84,12 @@ class Cruse1998:
     weights: AnyWeights
     """Coupling weights."""
     order: Order = "printed"
-    """Order of updates: 'printed', all legs at once, PEP(t+dt) from Delta(t) as Eq. 6 has it; 'undelayed', from
-    Delta(t+dt); 'sequential', the same leg after leg, each seeing the new states of those before it."""
+    """Order of updates. 'printed': all legs at once, PEP(t+dt) from Delta(t) as in Eq. 6. 'undelayed': all at once,
+    from Delta(t+dt). 'sequential': as undelayed, but leg after leg, each from the new states of the legs before it."""
     name: str = "cruse1998"
     """Name of the weight set."""
     model_variant: ModelVariant = field(default_factory=ModelVariant)
-    """Choices that the paper's sentences leave open."""
+    """Interpretation of the rules that the paper leaves open."""
 
     def __post_init__(self) -> None:
         choice("order", self.order, get_args(Order))
@@ -98,12 +98,12 @@ class Cruse1998:
 
     @property
     def mirrored(self) -> bool:
-        """Whether mirrored starts give mirrored walks: the legs move at once, and both sides weigh the same."""
+        """Whether mirrored starts give mirrored walks: the legs move at once, and both sides have equal weights."""
         matrices = [getattr(general(self.weights), kind) for kind in NEIGHBOURS]
         return self.order != "sequential" and all(np.array_equal(w, w[MIRROR, :][:, MIRROR]) for w in matrices)
 
     def without(self, mechanism: int) -> "Cruse1998":
-        """Return the network without one of the mechanisms 1 to 4, with a name that says so.
+        """Return the network without one of the mechanisms 1 to 4; its name ends with ``-without-N``.
 
         Raises:
             InputError: there is no such mechanism, or the weight set does not use it.
@@ -112,17 +112,17 @@ class Cruse1998:
         return self._having(mechanism, 0.0, f"{self.name}-without-{mechanism}")
 
     def having(self, mechanism: int) -> "Cruse1998":
-        """Return the network with mechanism 2 or 4 switched on, with a name that says so.
+        """Return the network with mechanism 2 or 4 switched on; its name ends with ``-with-N``.
 
         Raises:
-            InputError: another mechanism, or one that is on already.
+            InputError: the mechanism is not 2 or 4, or is on already.
         """
         if mechanism not in (2, 4):
-            raise InputError(f"mechanism = {mechanism}; expected 2 or 4, which are on or off")
+            raise InputError(f"mechanism = {mechanism}; only mechanisms 2 and 4 can be switched on")
         return self._having(mechanism, 1.0, f"{self.name}-with-{mechanism}")
 
     def _having(self, mechanism: int, value: float, name: str) -> "Cruse1998":
-        """Return the network with every weight of a mechanism set to a value."""
+        """Return the network called `name`, in which all weights of a mechanism have the given value."""
         kinds = [kind for kind in NEIGHBOURS if kind[1] == str(mechanism)]
         old: Any = self.weights
         if isinstance(old, Symmetric):
@@ -130,7 +130,7 @@ class Cruse1998:
         else:
             changed = Weights.of({(k, at): value if k in kinds else getattr(old, k)[at] for k, at in PLACES.values()})
         if np.array_equal(general(changed).to_vector(), general(old).to_vector()):
-            raise InputError(f"{name} equals {self.name}; expected a mechanism that changes the weights")
+            raise InputError(f"mechanism {mechanism} of {self.name} is already {'on' if value else 'off'}")
         return replace(self, weights=changed, name=name)
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> "NetworkPlan":
@@ -146,7 +146,7 @@ class Cruse1998:
         return replace(plan, first=plan.final)
 
     def _constants(self, stride: Stride, acceleration: Acceleration | None) -> Constants:
-        """Return weights, constants and rules, as the kernel reads them."""
+        """Return the arguments `p`, `k` and `rules` of the kernel."""
         w, d, g = general(self.weights), np.arange(6), stride.geometry
         span = stride.aep0 - stride.pep_min
         table = [(w.p1, kernel.REAR), (w.p1, kernel.CONTRA), (span * w.p2, kernel.REAR), (w.p4, kernel.FRONT)]
@@ -162,28 +162,28 @@ class Cruse1998:
 
 @dataclass(eq=False)
 class NetworkPlan:
-    """A `protocol.SteerablePlan`: the network of many starts, advanced as far as asked for."""
+    """A `protocol.SteerablePlan`: the network with many starts, advanced step by step."""
 
     starts: np.ndarray
     """(start, leg) tips at time 0 [mm]."""
     stride: Stride
     """Step range, lines of the tips and time step."""
     constants: Constants
-    """Constants of the network, as the kernel reads them."""
+    """Arguments `p`, `k` and `rules` of the kernel."""
     first: np.ndarray
     """(start,) V_r at time 0."""
     slow: np.ndarray
-    """(start,) V_r(0) of the acceleration; the final one where there is none."""
+    """(start,) V_r(0) of the acceleration; without an acceleration, the final V_r."""
     final: np.ndarray
-    """(start,) V_r that is accelerated to."""
+    """(start,) final V_r."""
     threads: int | None = None
-    """By default one per core."""
+    """Number of threads, by default one per core."""
     done: int = 0
     """Steps planned so far."""
 
     @cached_property
     def _blocks(self) -> np.ndarray:
-        """The kernel's state of all starts, (block, row of lanes), from time 0 on."""
+        """State of all starts in the kernel, (block, row of lanes); at first the state at time 0."""
         blocks = np.empty((-(-len(self.starts) // kernel.LANES), kernel.ROWS * kernel.LANES))
         kernel.begin_blocks(blocks, self.starts, self.first, self.final, self.constants[1])
         return blocks
@@ -207,7 +207,7 @@ class NetworkPlan:
         return PlannedWalk(time, velocity, x, y, stance, geometry, aep=aep, height=height)
 
     def first_losses(self, steps: np.ndarray) -> np.ndarray:
-        """See `protocol.Plan`; only the present state of each walk is kept in memory."""
+        """See `protocol.Plan`; the call keeps only the present state of each walk in memory."""
         if "_blocks" in vars(self):
             return planned_losses(self, steps, self.threads)
         lost, size = np.empty(len(steps), dtype=int), len(steps)
@@ -223,10 +223,10 @@ class NetworkPlan:
         return lost
 
     def first_losses_after(self, unseen: int, seen: int) -> np.ndarray:
-        """Advance by `unseen` steps and by `seen` more, without keeping them.
+        """Advance by `unseen` steps, then by `seen` steps, and find the first loss within the `seen` steps.
 
         Returns:
-            The first of the latter that is statically unstable, counted from time 0, (start,); 0 where none is.
+            Each start's first statically unstable step of the `seen` steps, (start,), counted from time 0; 0 if none.
         """
 
         def work(begin: int, end: int) -> None:
@@ -264,7 +264,7 @@ class NetworkPlan:
             self._write(row, np.where(which, values, self._read(row, 1).T).T, 1)
 
     def _read(self, row: int | np.integer, rows: int = 6) -> np.ndarray:
-        """Return a variable of every start, (start, leg), or (start, 1) with one row."""
+        """Return `rows` rows of the state from `row` on, (start, row): six for a variable of the legs, else one."""
         return self._rows(row, rows).transpose(0, 2, 1).reshape(-1, rows)[: len(self.starts)]
 
     def _write(self, row: int | np.integer, values: np.ndarray, rows: int = 6) -> None:

@@ -1,6 +1,6 @@
-"""Coupling weights of the 1998 network (paper, Section 2 and Appendix A), and the published weight sets.
+"""Coupling weights of the 1998 network (paper, Section 2 and Appendix A), in general and symmetric form.
 
-Letters follow the paper: ``p1`` is P^1 up to ``p4`` for P^4, ``p31`` ... ``p34`` are
+Names follow the paper: ``p1``, ``p2`` and ``p4`` are P^1, P^2 and P^4, ``p31`` ... ``p34`` are
 P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
 """
 
@@ -16,10 +16,10 @@ from hexmj.legs import LEGS, N1, N2, N3, N4
 from hexmj.validate import number, numbers
 
 NEIGHBOURS = {"p1": N1, "p2": N2, "p31": N3, "p32": N3, "p33": N3, "p34": N3, "p4": N4}
-"""Kind of weight -> for each destination leg the legs that act on it."""
+"""Kind of weight -> for each destination leg, the source legs that act on it."""
 
 BINARY = ("p2", "p4")
-
+"""Kinds of weights that are either 0 or 1."""
 
 PLACES = {
     f"{kind} {d + 1},{e + 1}": (kind, (d, e))
@@ -27,31 +27,31 @@ PLACES = {
     for d, sources in enumerate(table)
     for e in sources
 }
-"""Name of each of the 58 general weights, such as ``p1 1,2`` -> kind, destination and source leg."""
+"""Name of each of the 58 general weights, such as ``p1 1,2`` -> kind, and indices of destination and source leg."""
 
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """General weights P_{d,e} of each destination leg d and source leg e: 58 numbers, 48 where p34 = 0.
+    """General weights P_{d,e} of each destination leg d and source leg e: 58 numbers, or 48 if p34 = 0.
 
-    Every field is a (destination leg, source leg) array that is zero off the paper's
-    neighbour sets N^1 ... N^4.
+    Every field is an array (destination leg, source leg), which is zero where the source is not in the
+    paper's neighbour set N^1 ... N^4 of the destination.
     """
 
     p1: np.ndarray
-    """Mechanism 1: shift of the PEP while the source protracts [mm]."""
+    """Mechanism 1: shift of the destination's PEP to the rear while the source leg protracts [mm]."""
     p2: np.ndarray
-    """Mechanism 2: 0 or 1."""
+    """Mechanism 2: off (0) or on (1)."""
     p31: np.ndarray
-    """Mechanism 3: neutral position at V_r = 0 [mm]."""
+    """Mechanism 3: neutral position of the source leg at V_r = 0 [mm]."""
     p32: np.ndarray
-    """Mechanism 3: weight behind the neutral position."""
+    """Mechanism 3: weight while the source leg is behind its neutral position."""
     p33: np.ndarray
-    """Mechanism 3: weight ahead of the neutral position."""
+    """Mechanism 3: weight while the source leg is ahead of its neutral position."""
     p34: np.ndarray
-    """Mechanism 3: change of the neutral position with V_r [mm]."""
+    """Mechanism 3: shift of the source leg's neutral position at V_r = 1, in proportion to V_r [mm]."""
     p4: np.ndarray
-    """Mechanism 4: 0 or 1."""
+    """Mechanism 4: off (0) or on (1)."""
 
     def __post_init__(self) -> None:
         for kind in NEIGHBOURS:
@@ -60,15 +60,15 @@ class Weights:
                 raise InputError(f"{kind} has the shape {matrix.shape}; expected 6 x 6 finite weights")
             for d, e in np.argwhere(matrix):
                 if e not in NEIGHBOURS[kind][d]:
-                    raise InputError(f"{kind} of leg {LEGS[d]} from leg {LEGS[e]} is not 0, but they are no neighbours")
+                    raise InputError(f"{kind} of leg {LEGS[d]} from leg {LEGS[e]} is not 0; they do not interact")
             if kind in BINARY and not np.isin(matrix, (0.0, 1.0)).all():
-                raise InputError(f"{kind} is binary in the paper; expected only 0 or 1")
+                raise InputError(f"{kind} has a weight between or beyond 0 and 1; expected only 0 or 1")
             matrix.setflags(write=False)
             object.__setattr__(self, kind, matrix)
 
     @classmethod
     def of(cls, numbers: Mapping[tuple[str, tuple[int, int]], float]) -> "Weights":
-        """Return weights from numbers by kind and (destination, source) leg, each from 0 to 5; the others are 0."""
+        """Return weights from (kind, (destination, source)) -> number, with legs from 0 to 5; missing weights are 0."""
         matrices = {kind: np.zeros((6, 6)) for kind in NEIGHBOURS}
         for (kind, pair), value in numbers.items():
             matrices[kind][pair] = number(f"{kind} {pair}", value)
@@ -79,7 +79,7 @@ class Weights:
         """Return weights from 58 numbers in the order of `PLACES`.
 
         Raises:
-            InputError: another number of them, or an invalid weight.
+            InputError: the vector does not have 58 numbers, or a weight is invalid.
         """
         values = numbers("weights", vector).ravel()
         if values.size != len(PLACES):
@@ -87,7 +87,7 @@ class Weights:
         return cls.of(dict(zip(PLACES.values(), values, strict=True)))
 
     def to_vector(self) -> np.ndarray:
-        """Return the inverse of `from_vector`."""
+        """Return the 58 weights in the order of `PLACES`; the inverse of `from_vector`."""
         return np.array([getattr(self, kind)[pair] for kind, pair in PLACES.values()])
 
 
@@ -96,23 +96,23 @@ class Symmetric:
     """Weights with the symmetries of Appendix A: ten numbers (LDVS), nine where p34_i = 0 (HWS)."""
 
     p1_i: float = 0.0
-    """P_i^1: shift of the PEP while the ipsilateral rear leg protracts [mm]."""
+    """P_i^1: shift of the PEP to the rear while the ipsilateral rear leg protracts [mm]."""
     p1_c: float = 0.0
-    """P_c^1: shift of the PEP while the contralateral leg protracts [mm]."""
+    """P_c^1: shift of the PEP to the rear while the contralateral leg protracts [mm]."""
     p2: float = 0.0
     """P^2: mechanism 2 off (0) or on (1)."""
     p31_i: float = 0.0
-    """P_i^{3,1}: ipsilateral neutral position at V_r = 0 [mm]."""
+    """P_i^{3,1}: neutral position of the ipsilateral anterior leg at V_r = 0 [mm]."""
     p32_i: float = 0.0
-    """P_i^{3,2}: ipsilateral weight behind the neutral position."""
+    """P_i^{3,2}: weight of mechanism 3 while the ipsilateral anterior leg is behind its neutral position."""
     p33_i: float = 0.0
-    """P_i^{3,3}: ipsilateral weight ahead of the neutral position."""
+    """P_i^{3,3}: weight of mechanism 3 while the ipsilateral anterior leg is ahead of its neutral position."""
     p34_i: float = 0.0
-    """P_i^{3,4}: change of the ipsilateral neutral position with V_r [mm]."""
+    """P_i^{3,4}: shift of the ipsilateral anterior leg's neutral position at V_r = 1, in proportion to V_r [mm]."""
     p31_c: float = 0.0
-    """P_c^{3,1}: contralateral neutral position [mm]."""
+    """P_c^{3,1}: neutral position of the contralateral leg [mm]."""
     p32_c: float = 0.0
-    """P_c^{3,2} = P_c^{3,3}: contralateral weight of mechanism 3."""
+    """P_c^{3,2} = P_c^{3,3}: weight of mechanism 3 from the contralateral leg."""
     p4_i: float = 0.0
     """P_i^4: mechanism 4 off (0) or on (1)."""
 
@@ -124,7 +124,7 @@ class Symmetric:
             object.__setattr__(self, key, float(value))
 
     def expand(self) -> Weights:
-        """Return the general weights of Appendix A, equal on both sides and along each side."""
+        """Return the general weights that Appendix A derives: equal on both sides and along each side."""
         sides = {  # ipsilateral, contralateral
             "p1": (self.p1_i, self.p1_c),
             "p2": (self.p2, 0.0),
@@ -142,5 +142,5 @@ AnyWeights = Symmetric | Weights
 
 @lru_cache(maxsize=64)
 def general(weights: AnyWeights) -> Weights:
-    """Return the general weights of either form."""
+    """Return the weights in general form; symmetric weights are expanded."""
     return weights.expand() if isinstance(weights, Symmetric) else weights
