@@ -1,4 +1,4 @@
-"""Controllers plan the steps of the legs. `protocol` defines them, `registry` finds them by name.
+"""Controllers plan the steps of the legs: `protocol` defines their interface, `registry` loads them by name.
 
 A controller of your own is a frozen dataclass with a `name` and a method `begin`; `stepwise` makes its plan from a
 function of one step.

@@ -1,4 +1,4 @@
-"""Does a controller keep the interface of `protocol`? `check_controller` asks, from pytest or the command line."""
+"""Run the interface checks of a controller: `check_controller` for pytest, `findings` for the command line."""
 
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -14,11 +14,11 @@ from hexmj.starts import checked_list, draw_starts
 from hexmj.timing import Acceleration, Stride, check_reached
 
 VELOCITIES = (0.0, 0.02, 0.5, 0.95)
-"""V_r of the starts of a trial, in turn, by default."""
+"""Default velocities V_r of a trial, which its starts take in turn."""
 
 ACCELERATION = Acceleration(rate=0.005, start=0.1)
-"""Of the trial that accelerates: V = 0.3 is reached after 40 time units. It begins with the least velocity of the trial
-where that is higher than this start, or where none is higher."""
+"""Acceleration of the accelerating trial: V = 0.3 is reached after 40 time units. If all velocities of the trial are
+above `start`, or none is, walks accelerate from the lowest velocity instead."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Finding:
     name: str
     """Name of the check."""
     well: bool
-    """Whether it passed."""
+    """Whether the check passed."""
     found: str
-    """What is wrong, with values, or what was checked."""
+    """What was checked, or what is wrong, with values."""
     note: bool = False
-    """Whether it is a remark rather than a check."""
+    """True for a remark, which always passes."""
 
 
 def check_controller(
@@ -41,10 +41,10 @@ def check_controller(
     """Run the interface checks of a controller; this takes a few seconds.
 
     Args:
-        controller: has to plan with the stride at each of the velocities, and to accelerate to them.
+        controller: the controller; it must plan with this stride at each velocity, and accelerate to it.
         stride: step range, lines of the tips and time step.
-        velocities: 2 to 16 values of V_r, 0 <= V < 1, fractions of V_p. Walks accelerate from 0.1, or from the least
-            of them where all or none are above that; V and a step of that acceleration, 0.005 dt, are below 1 together.
+        velocities: 2 to 16 values of V_r as fractions of V_p, 0 <= V < 1 - 0.005 dt. Accelerating walks begin at 0.1,
+            or at the lowest velocity if all velocities are above 0.1, or none is.
 
     Raises:
         InputError: a velocity is out of range.
@@ -58,9 +58,9 @@ def check_controller(
 def findings(
     controller: Controller, stride: Stride | None = None, velocities: Sequence[float] = VELOCITIES
 ) -> Iterator[Finding]:
-    """Yield the result of each check, in order, and at last how far standing feet slide, which is a remark.
+    """Yield the result of each check in order, and finally a remark on how fast standing feet slide.
 
-    After a failed check of `FIRST` the later ones are left out: they would find the same again.
+    If a check of `FIRST` fails, the later checks are left out: they would fail for the same reason.
 
     Raises:
         InputError: a velocity is out of range.
@@ -68,7 +68,7 @@ def findings(
     check_controller_type(controller)
     v, stride = checked_list(velocities), stride or Stride()
     if not 2 <= len(v) <= N_STARTS:
-        raise InputError(f"velocities = {v.tolist()}; expected 2 to {N_STARTS}, so that walks accelerate between them")
+        raise InputError(f"velocities = {v.tolist()}; expected 2 to {N_STARTS} values, so that walks can accelerate")
     check_reached(v, stride, ACCELERATION)
     trials = [*_trials(controller, v, stride)]
     for name, law in LAWS.items():
@@ -81,7 +81,7 @@ def findings(
 
 
 def _trials(controller: Controller, velocities: np.ndarray, stride: Stride) -> Iterator[Trial]:
-    """Drawn and extreme starts, at several velocities at once, constant and accelerating."""
+    """Yield a trial with constant and a trial with accelerating V_r, both with drawn starts and two extreme starts."""
     starts, velocity = draw_starts(N_STARTS, 0, stride), np.resize(velocities, N_STARTS)
     starts[-1], starts[N_STARTS // 2 - 1] = stride.pep0, stride.aep0
     yield Trial(controller, starts, velocity, stride, None)
@@ -91,7 +91,7 @@ def _trials(controller: Controller, velocities: np.ndarray, stride: Stride) -> I
 
 
 def _failure(law: Callable[[Trial], None], trial: Trial) -> str | None:
-    """Return what a check finds wrong in one line, or None."""
+    """Run a check and return its error message on one line, or None if the check passes."""
     try:
         law(trial)
         return None
@@ -99,14 +99,14 @@ def _failure(law: Callable[[Trial], None], trial: Trial) -> str | None:
         found = f"{error}; if the controller cannot plan there, check it at other velocities or time steps"
     except InputError as error:
         found = str(error)
-    except Exception as error:  # of the controller
+    except Exception as error:  # raised by the controller
         at = traceback.extract_tb(error.__traceback__)[-1]
         found = f"{type(error).__name__} in {at.filename}, line {at.lineno}: {error}"
     return f"{'accelerating: ' if trial.acceleration else ''}{' '.join(found.split())}"
 
 
 def _sliding(trials: list[Trial]) -> str:
-    """Describe how far standing tips are from receding at V_r, as the tips of feet that stay in place on the ground."""
+    """Describe how fast standing feet slide: the tip of a foot that stays in place on the ground recedes at V_r."""
     slides = []
     for walk, dt in ((trial.walk, trial.stride.dt) for trial in trials):
         ahead, aside = np.diff(walk.x, axis=0) / dt + walk.velocity[1:, :, None], np.diff(walk.y, axis=0) / dt
@@ -115,8 +115,8 @@ def _sliding(trials: list[Trial]) -> str:
         slides.append((speed.max(), place(walk, (step + 1, *others))))
     most, where = max(slides)
     if most <= 1e-6:
-        return "feet that stand stay where they are on the ground: their tips recede at V_r"
+        return "standing feet stay in place on the ground: their tips recede at V_r"
     return (
-        "feet that stand would slide: the tip of a foot that stays in place recedes at V_r, but one differs by"
-        f" {most:.2g} V_p, in {where}; in physical walks such feet scrape"
+        "standing feet would slide: the tip of a foot that stays in place recedes at V_r, but a tip differs from it by"
+        f" {most:.2g} V_p, in {where}; in physical walks such feet scrape over the ground"
     )

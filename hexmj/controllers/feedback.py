@@ -1,15 +1,15 @@
-"""Sensory feedback around any steerable controller: before each step the plan reads the legs as they are.
+"""Sensory feedback for any steerable controller: before each step its plan receives the sensed tips and contacts.
 
-Its decisions (in the 1998 network: influences, the crossing of PEP and AEP) use
+The plan decides (in the 1998 network: influences, and whether a tip has crossed PEP or AEP) by
 
-- the tips where the joint angles put them in the root frame, on each leg's axis;
-- the contacts: a leg that protracts stands as soon as its foot meets the ground again, so that a swing ends at an
-  obstacle.
+- the sensed tips, computed from the joint angles in the root frame, on each leg's axis;
+- the contacts: a protracting leg begins its stance as soon as its foot touches the ground, so that an obstacle ends a
+  swing.
 
-A leg that should stand and has no ground counts as standing. The targets of the servos are not the sensed tips: they
-move by -V_r dt or +dt, and take up the plan's response to the sensed tip only where the leg changes its state, or where
-the plan puts it elsewhere, as after a halt. A target that restarts from the lagging tip at every step never loads its
-servo. `docs/feedback.md` describes the alternatives that were tried.
+A leg that should stand but has no ground contact counts as standing. The targets of the servos differ from the sensed
+tips: in each step a target moves by -V_r dt in stance or +dt in swing. It is set to the tip that the plan computes from
+the sensed tip only where the leg changes its state, or where the plan moves the tip in another way, as after a halt.
+If every step set the target from the sensed tip, which lags, the target would never load its servo.
 """
 
 from dataclasses import dataclass, replace
@@ -24,49 +24,49 @@ from hexmj.errors import InputError
 from hexmj.walks import PlannedWalk, joined
 
 SAME = 1e-9
-"""Greatest distance of a tip from one step beyond its sensed place at which it counts as moved on from there [mm]."""
+"""Greatest distance between the planned tip and the sensed tip moved on by one step that counts as equal [mm]."""
 
 
 @dataclass(frozen=True)
 class SensoryFeedback(Wrapper):
-    """A controller with sensory feedback, made from a steerable one."""
+    """A steerable controller to which sensory feedback is added."""
 
     @property
     def name(self) -> str:
-        """The controller's name, and what is different."""
+        """Name of the wrapped controller, followed by 'with feedback'."""
         return f"{self.controller.name} with feedback"
 
     @property
     def mirrored(self) -> bool:
-        """As the controller that plans."""
+        """Whether the wrapped controller is mirrored, see `protocol.Controller`."""
         return getattr(self.controller, "mirrored", False)
 
     def wrap(self, plan: Any) -> "SensedPlan":
-        """See `Wrapper`; the plan has no feedback of its own, and can be steered."""
+        """Return a `SensedPlan` around a plan at time 0, which must be steerable and have no feedback of its own."""
         if isinstance(plan, FeedbackPlan) or not isinstance(plan, SteerablePlan):
             expected = "a steerable plan (tips, standing, see, restart, slow_down) without feedback of its own"
-            raise InputError(f"feedback around {self.controller.name}; expected {expected}")
+            raise InputError(f"{self.controller.name} cannot receive feedback; expected {expected}")
         return SensedPlan(plan)
 
 
 class SensedPlan(WrappedPlan):
     """A `protocol.FeedbackPlan` that continues from the sensed tips and contacts, with targets that load the servos.
 
-    What is not sensed is taken to be as planned, so that without `sense` the walk is the kinematic one.
+    The legs of a start that is not sensed count as planned, so that without `sense` the walk is the kinematic one.
     """
 
     def __init__(self, plan: SteerablePlan) -> None:
-        """Wrap a plan at time 0; other legs may have been given to it before."""
+        """Wrap a plan that is at time 0; its method `see` may have been called before."""
         super().__init__(plan)
-        self._tips = self._targets = self._ordered = np.array(plan.tips)
+        self._tips = self._targets = self._previous = np.array(plan.tips)
         self._stance = np.array(plan.standing)
 
     def first_losses(self, steps: np.ndarray) -> np.ndarray:
-        """See `protocol.Plan`: in a kinematic walk, those of the plan within."""
+        """See `protocol.Plan`: in a kinematic walk, the wrapped plan has the same first losses."""
         return first_losses(self._plan, steps)
 
     def sense(self, sensed: Sensed) -> None:
-        """Receive the tips, and which feet have met the ground."""
+        """Receive the sensed tips, and begin the stance of protracting legs whose feet have gained contact."""
         lands = np.zeros(self._stance.shape, dtype=bool)
         lands[sensed.ids] = sensed.gained
         self._tips = self._tips.copy()
@@ -75,7 +75,7 @@ class SensedPlan(WrappedPlan):
         self._stance = self._stance | lands
 
     def advance(self, steps: int) -> PlannedWalk:
-        """Return the next steps: targets of the tips, and which legs stand."""
+        """Return the next `steps` steps, with the targets of the servos as tips."""
         return joined([self._step() for _ in range(steps)])
 
     def _step(self) -> PlannedWalk:
@@ -83,9 +83,9 @@ class SensedPlan(WrappedPlan):
         step = self._plan.advance(1)
         self.done = self._plan.done
         way = np.where(self._stance, -step.velocity[0][:, None], 1.0) * self.stride.dt
-        goes_on = (step.stance[0] == self._stance) & (np.abs(step.x[0] - self._tips - way) < SAME)
-        self._tips = self._targets = np.where(goes_on, self._targets + way, step.x[0])
+        continues = (step.stance[0] == self._stance) & (np.abs(step.x[0] - self._tips - way) < SAME)
+        self._tips = self._targets = np.where(continues, self._targets + way, step.x[0])
         self._stance = step.stance[0].copy()
-        put_back = self._targets < self._ordered  # such a tip is not on its way to the AEP
-        aep, self._ordered = np.where(put_back, np.nan, step.aep[0]), self._targets
+        moved_back = self._targets < self._previous  # such a tip is not on its way to the AEP
+        aep, self._previous = np.where(moved_back, np.nan, step.aep[0]), self._targets
         return replace(step, x=self._targets[None], aep=aep[None])

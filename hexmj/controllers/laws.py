@@ -1,4 +1,4 @@
-"""The interface checks of controllers: each is a function of a trial walk that raises InputError where it fails."""
+"""The interface checks of controllers: each is a function that takes a `Trial` and raises InputError if it fails."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
@@ -30,63 +30,63 @@ from hexmj.timing import AT_SPEED, Acceleration, Stride, commanded_velocities
 from hexmj.walks import PLANNED, PlannedWalk, joined, of_starts
 
 N_STARTS, STEPS = 16, 600
-"""Starts of a trial and steps of its walk: 60 time units, a swing and a stance at V = 0.5."""
+"""Number of starts of a trial, and of steps of its walk: 60 time units, a swing and a stance at V = 0.5."""
 
 EVERY_OTHER = np.arange(N_STARTS) % 2 == 0
-"""Every other start, (start,) of bool."""
+"""(start,) mask of every second start."""
 
 DIVIDED = (1, 7, 250, 342)
-"""The same number of steps in parts."""
+"""The `STEPS` steps of a trial, divided into four calls of `advance`."""
 
 REACH = 0.8
-"""Distance of a tip beyond PEP_min or AEP_0 on its own axis [mm] that is allowed besides two time steps' way at V_p:
-legs overshoot both by a step, and a leg that is raised out there swings for another."""
+"""Allowed distance of a tip beyond PEP_min or AEP_0 on its own axis [mm], in addition to two time steps at V_p: a leg
+passes either limit by up to one step, and a leg that lifts off beyond AEP_0 swings for a second step."""
 
 BESIDE = 0.5
-"""Allowed distance of a tip from its leg's line, as a fraction of the line's distance from the body axis."""
+"""Allowed lateral distance of a tip from its leg's line, as a fraction of the line's distance from the body axis."""
 
 BEFORE = AFTER = 250
-"""Steps before a plan is steered, and after it: 25 time units, a swing and a quarter."""
+"""Number of steps before and after a plan is steered: 25 time units each, 1.25 times the duration of a swing."""
 
 SENSED_STEPS, NUMBERS = 99, 50
-"""Steps in which a plan senses, and numbers that each start senses: six for contacts, 18 joint angles, 18 torques,
-tilt, velocity and turning."""
+"""Number of steps in which a plan senses, and of random numbers per start and step: 6 for contacts, 18 for joint
+angles, 18 for torques, 2 for tilt, 3 for velocity and 3 for turning."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Walks that a controller has to plan."""
+    """A controller and the arguments of the walks that it plans in a check."""
 
     controller: Controller
-    """Plans them."""
+    """The controller that is checked."""
     starts: np.ndarray
-    """Tips at time 0, (start, leg) [mm]."""
+    """(start, leg) tips at time 0 [mm]."""
     velocity: np.ndarray
-    """V_r, or its final value, (start,)."""
+    """(start,) V_r, or its final value when accelerating."""
     stride: Stride
     """Step range, lines of the tips and time step."""
     acceleration: Acceleration | None
-    """Eq. 11, if the walks accelerate."""
+    """Acceleration of Eq. 11, or None for constant V_r."""
     at_speed: bool = False
-    """Whether they begin at their final velocity, and accelerate only after a restart or `slow_down`."""
+    """Whether plans begin at their final velocity and accelerate only after `restart` or `slow_down`."""
 
     def begin(self, threads: int | None = 1) -> Plan:
-        """Return a new plan."""
+        """Return a new plan of these walks."""
         arguments = self.starts, self.velocity, self.stride, self.acceleration, threads
         return begin(self.controller, *arguments, self.at_speed)
 
     @cached_property
     def walk(self) -> PlannedWalk:
-        """All steps at once."""
+        """The first `STEPS` steps of the walks, planned in one call."""
         return advanced(self.begin(), STEPS)
 
     def of(self, which: Any) -> "Trial":
-        """Return the trial of some starts."""
+        """Return the same trial with only the starts that `which` selects."""
         return replace(self, starts=self.starts[which], velocity=self.velocity[which])
 
 
 def _settings(trial: Trial) -> None:
-    """The controller is a frozen dataclass with a name, its settings are plain data."""
+    """The controller is a frozen dataclass with a name, and its settings are plain data."""
     controller: Any = trial.controller
     if not controller.__dataclass_params__.frozen:
         raise InputError("the dataclass is not frozen; expected @dataclass(frozen=True)")
@@ -94,13 +94,13 @@ def _settings(trial: Trial) -> None:
 
 
 def _begin(trial: Trial) -> None:
-    """Plans begin at time 0 with the starts and stride of their arguments."""
+    """Plans begin at time 0 with the given starts and stride."""
     check_velocities(trial.controller, sorted({*trial.velocity.tolist()}), trial.stride, trial.acceleration)
     trial.begin()
 
 
 def _steps(trial: Trial) -> None:
-    """Tips are finite, and stance, aep and height of every step, start and leg; arguments do not change."""
+    """Every step has finite tips, and stance, AEP and height for all starts and legs; planning changes no argument."""
     starts, velocity, settings = trial.starts.copy(), trial.velocity.copy(), settings_of(trial.controller)
     plan = trial.controller.begin(starts, velocity, trial.stride, trial.acceleration)
     advanced(plan, STEPS)
@@ -108,11 +108,11 @@ def _steps(trial: Trial) -> None:
     _check_equal("velocity after the walk", velocity, trial.velocity)
     _check_equal("the plan's starts after the walk", plan.starts, trial.starts)
     if (now := settings_of(trial.controller)) != settings:
-        raise InputError(f"begin changes the controller to {now}; expected {settings}")
+        raise InputError(f"planning changes the controller's settings to {now}; expected {settings}")
 
 
 def _times(trial: Trial) -> None:
-    """Time is k dt, and velocity is V_r as commanded (`timing.commanded_velocities`)."""
+    """Step k ends at time k dt, and velocity is the commanded V_r (`timing.commanded_velocities`)."""
     commanded = commanded_velocities(trial.velocity, 0, STEPS, trial.stride, trial.acceleration)
     _check_equal("time (step)", trial.walk.time, np.arange(1, STEPS + 1) * trial.stride.dt)
     _check_equal("velocity (step, start)", trial.walk.velocity, commanded)
@@ -134,13 +134,13 @@ def _reach(trial: Trial) -> None:
 
 
 def _begun_again(trial: Trial) -> None:
-    """Plans with the same arguments are the same walk, with any number of threads."""
+    """Plans with the same arguments give the same walk, with any number of threads."""
     check_same(trial.walk, advanced(trial.begin(), STEPS), "two plans with the same arguments")
     check_same(trial.walk, advanced(trial.begin(threads=2), STEPS), "plans with 1 and 2 threads")
 
 
 def _divided(trial: Trial) -> None:
-    """The walk does not depend on how steps are divided into calls."""
+    """Several short calls of `advance` give the same walk as one long call."""
     plan = trial.begin()
     walk = joined([advanced(plan, steps) for steps in DIVIDED])
     _check_equal("time (step) in parts", walk.time, trial.walk.time)
@@ -148,7 +148,7 @@ def _divided(trial: Trial) -> None:
 
 
 def _side_by_side(trial: Trial) -> None:
-    """Two plans that advance in turn are independent."""
+    """Two plans that are advanced in turn do not affect each other."""
     other = replace(trial, starts=trial.starts[::-1], velocity=trial.velocity[::-1])
     plans = trial.begin(), other.begin()
     parts = zip(*([advanced(plan, steps) for plan in plans] for steps in DIVIDED), strict=True)
@@ -157,14 +157,14 @@ def _side_by_side(trial: Trial) -> None:
 
 
 def _batch(trial: Trial) -> None:
-    """A start walks alike alone, in another order and among others."""
+    """A start walks in the same way alone, in another order and among other starts."""
     n = len(trial.starts)
     for which in ([0], [n - 2], [1, n - 1, 2], [*range(n)[::-1]], np.arange(3 * n) % n):
         check_same(of_starts(trial.walk, which), trial.of(which).walk, "starts alone, in another order or among others")
 
 
 def _first_losses(trial: Trial) -> None:
-    """The plan's first_losses, if it has them, are those of its steps."""
+    """The method first_losses of a plan, if there is one, gives the first unstable steps of the planned walk."""
     plan: Any = trial.begin()
     if hasattr(plan, "first_losses"):
         steps = STEPS * (len(trial.starts) - np.arange(len(trial.starts))) // len(trial.starts)
@@ -172,14 +172,14 @@ def _first_losses(trial: Trial) -> None:
 
 
 def _at_speed(trial: Trial) -> None:
-    """The plan of begin_at_speed, if there is one, walks as that of begin without an acceleration."""
+    """A plan of begin_at_speed, if there is one, walks like a plan of begin without an acceleration."""
     if isinstance(trial.controller, SteerableController):
-        usual = replace(trial, acceleration=None).walk
-        check_same(usual, replace(trial, at_speed=True).walk, "begin without an acceleration, and begin_at_speed,")
+        constant = replace(trial, acceleration=None).walk
+        check_same(constant, replace(trial, at_speed=True).walk, "begin without an acceleration, and begin_at_speed,")
 
 
 def _mirrored(trial: Trial) -> None:
-    """Mirrored starts give mirrored walks, if the controller is mirrored."""
+    """Mirrored starts give mirrored walks, if the controller has `mirrored = True`."""
     if getattr(trial.controller, "mirrored", False):
         other = replace(trial, starts=trial.starts[:, MIRROR]).walk
         back = replace(other, **{name: getattr(other, name)[..., MIRROR] for name in PLANNED})
@@ -187,7 +187,7 @@ def _mirrored(trial: Trial) -> None:
 
 
 def _see(trial: Trial) -> None:
-    """A steerable plan is where its last step says, and continues from other legs after see."""
+    """A steerable plan reports the legs of its last step, and after see it continues from the given legs."""
     for variant, plan in _steerable(trial):
         last, which = advanced(plan, BEFORE), EVERY_OTHER
         _check_legs("after a step", plan, last.x[-1], last.stance[-1])
@@ -202,7 +202,7 @@ def _see(trial: Trial) -> None:
 
 
 def _restart(trial: Trial) -> None:
-    """Starts that restart walk as they begin, and the others are not affected."""
+    """Restarted starts walk like starts of a new plan, and the other starts are not affected."""
     for variant, plan in _steerable(trial):
         last, which = advanced(plan, BEFORE), EVERY_OTHER
         others = replace(trial, starts=trial.starts[::-1])
@@ -216,7 +216,7 @@ def _restart(trial: Trial) -> None:
 
 
 def _slow_down(trial: Trial) -> None:
-    """Starts that are slowed down begin at V_r(0) again, and the others are not affected."""
+    """After slow_down, the selected starts accelerate from V_r(0) again, and the other starts are not affected."""
     for variant, plan in _steerable(trial):
         last, which = advanced(plan, BEFORE), EVERY_OTHER
         plan.slow_down(which.copy())
@@ -230,11 +230,11 @@ def _slow_down(trial: Trial) -> None:
 
 
 def _sense(trial: Trial) -> None:
-    """With sensory feedback a start depends on what is sensed of it, and of no other."""
+    """With sensory feedback, a start depends on the sensed state of its own legs and of no other start."""
     if isinstance(trial.begin(), FeedbackPlan):
         which, last = EVERY_OTHER, [len(trial.starts) - 2]
         felt = np.random.default_rng(0).uniform(-1.0, 1.0, (SENSED_STEPS, len(which), NUMBERS))
-        felt[:, ~which] = felt[SENSED_STEPS // 2 :, ::4] = np.nan  # half of the sensed starts have fallen then
+        felt[:, ~which] = felt[SENSED_STEPS // 2 :, ::4] = np.nan  # from the middle on, half of these have fallen
         walk, alone = _with_sense(trial, felt), _with_sense(trial.of(last), felt[:, last])
         unsensed = advanced(trial.of(~which).begin(), len(walk.time))
         check_same(of_starts(walk, ~which), unsensed, "starts that are not sensed")
@@ -242,7 +242,7 @@ def _sense(trial: Trial) -> None:
 
 
 def _check_equal(what: str, found: Any, expected: np.ndarray) -> None:
-    """Raise InputError unless an array is as expected."""
+    """Raise InputError unless the array `found`, described by `what`, equals `expected` in shape and values."""
     found = np.asarray(found)
     if found.shape != expected.shape:
         raise InputError(f"{what} has the shape {found.shape}; expected {expected.shape}")
@@ -252,7 +252,7 @@ def _check_equal(what: str, found: Any, expected: np.ndarray) -> None:
 
 
 def _steerable(trial: Trial) -> Iterator[tuple[Trial, SteerablePlan]]:
-    """Yield the trial, and that at speed, each with a new plan, as far as plans can be steered."""
+    """Yield the trial and, if possible, the trial at speed, each with a new plan; skip plans that are not steerable."""
     at_speed = [replace(trial, at_speed=True)] * isinstance(trial.controller, SteerableController)
     for variant in (trial, *at_speed):
         plan = variant.begin()
@@ -261,19 +261,19 @@ def _steerable(trial: Trial) -> Iterator[tuple[Trial, SteerablePlan]]:
 
 
 def _check_legs(when: str, plan: SteerablePlan, tips: np.ndarray, standing: np.ndarray) -> None:
-    """Raise InputError unless a plan's own tips and states are these, (start, leg)."""
+    """Raise InputError unless the plan's tips and standing legs equal the given arrays, (start, leg)."""
     _check_equal(f"tips (start, leg) {when}", plan.tips, tips)
     _check_equal(f"standing (start, leg) {when}", plan.standing, standing)
 
 
 def _later(trial: Trial) -> PlannedWalk:
-    """Return the steps after `BEFORE` of a plan that is not steered."""
+    """Return the `AFTER` steps that follow the first `BEFORE` steps of a plan that is not steered."""
     advanced(plan := trial.begin(), BEFORE)
     return advanced(plan, AFTER)
 
 
 def _with_sense(trial: Trial, felt: np.ndarray) -> PlannedWalk:
-    """Return steps of a plan that senses `felt`, (step, start, number), for the starts that are not NaN."""
+    """Return the walk of a plan that senses the numbers `felt`, (step, start, number); starts at NaN sense nothing."""
     plan: Any = trial.begin()
     parts = [advanced(plan, 1)]
     for numbers in felt:
@@ -287,9 +287,9 @@ def _with_sense(trial: Trial, felt: np.ndarray) -> PlannedWalk:
 
 
 def _legs_as_planned(walk: PlannedWalk, ids: np.ndarray, stride: Stride, numbers: np.ndarray) -> Sensed:
-    """Return what legs sense that follow the plan, with standing feet 10 mm below the root.
+    """Return the sensed state of legs that follow the plan, with standing feet 10 mm below the root.
 
-    Contacts, joints and the root's motion are made of numbers between -1 and 1, (n, number).
+    Contacts, joints and the root's motion are computed from `numbers`, (n, number), between -1 and 1.
     """
     x, y, stance, height = (getattr(walk, name)[-1, ids] for name in ("x", "y", "stance", "height"))
     tips = np.stack([x + np.array(stride.geometry.origin), y, np.nan_to_num(height) - 10.0], axis=-1)
@@ -310,7 +310,7 @@ LAWS: dict[str, Callable[[Trial], None]] = {
         *(_at_speed, _see, _restart, _slow_down, _mirrored, _sense),
     )
 }
-"""Every interface check by its name; its docstring says what holds if it passes."""
+"""Name -> interface check; the docstring of the check says what holds if the check passes."""
 
 FIRST = ("begin", "steps", "begun again", "divided")
-"""Checks on which all later ones rest."""
+"""Names of the checks that all later checks rely on."""

@@ -1,4 +1,4 @@
-"""Plans for everyone who walks: begun with valid arguments, advanced, checked once, and searched for first losses."""
+"""Begin, advance and check plans, and find their first losses of static stability."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -17,16 +17,16 @@ from hexmj.validate import short
 from hexmj.walks import PLANNED, PlannedWalk, copied
 
 STEP_MEMORY = 400
-"""Memory that one step of one start takes while it is planned [bytes]."""
+"""Memory for planning one step of one start [bytes]."""
 
 REPEATED = 20
-"""Steps in which two plans are compared: every leg that lifts within two time units shows."""
+"""Number of steps in which `check_repeats` compares two plans: two time units with the default time step."""
 
 HELD = 400_000
-"""Steps times starts of a plan that are held in memory while its losses are searched for."""
+"""Maximum number of steps times starts of a plan that `planned_losses` holds in memory."""
 
 MOST_AT_ONCE = 200
-"""Most steps at once in that search, so that few starts that are lost early do not walk on for long."""
+"""Maximum number of steps that `planned_losses` plans in one call: it plans few steps after the last first loss."""
 
 
 def begin(
@@ -40,10 +40,10 @@ def begin(
 ) -> Plan:
     """Return a controller's plan for starts, (start, leg) [mm], and V_r, one number or (start,).
 
-    `at_speed` it is a `SteerablePlan` that walks at its final velocity from time 0.
+    With `at_speed` the plan is a `SteerablePlan` that walks at its final velocity from time 0.
 
     Raises:
-        InputError: a start, velocity or plan is out of range; `Refused` if the controller refuses.
+        InputError: a start or velocity is out of range, or the plan is invalid; `Refused` if the controller refuses.
     """
     check_controller_type(controller)
     if at_speed:
@@ -68,9 +68,9 @@ def begin(
 def check_velocities(
     controller: Controller, velocities: Iterable[float], stride: Stride, acceleration: Acceleration | None = None
 ) -> None:
-    """Raise InputError if a controller refuses one of some V_r with this time step (its `check_velocity`).
+    """Raise InputError if the controller's `check_velocity` refuses one of the V_r with the time step of the stride.
 
-    Walks that accelerate are refused later, if they reach such a V_r.
+    With an acceleration nothing is checked: a walk is refused only when it reaches such a V_r.
     """
     check = getattr(controller, "check_velocity", None)
     if check and not acceleration:
@@ -79,20 +79,20 @@ def check_velocities(
 
 
 def check_plan(plan: Plan, starts: np.ndarray, stride: Stride) -> None:
-    """Raise InputError unless a plan is at time 0 of these starts, (start, leg) [mm], with this stride."""
+    """Raise InputError unless the plan is at step 0 and has these starts, (start, leg) [mm], and this stride."""
     if not isinstance(plan, Plan):
         raise InputError(f"begin returned {short(plan)}; expected a plan with starts, stride, done and advance")
     if plan.done != 0 or plan.stride != stride:
         raise InputError(f"the plan is at step {plan.done} with {plan.stride}; expected step 0 with {stride}")
     if not np.array_equal(plan.starts, starts):
-        raise InputError(f"the plan's starts, {np.shape(plan.starts)}, are not those of the walk, {starts.shape}")
+        raise InputError(f"the plan's starts, {np.shape(plan.starts)}, differ from the given starts, {starts.shape}")
 
 
 def advanced(plan: Plan, steps: int) -> PlannedWalk:
-    """Return the plan's next steps in new arrays.
+    """Return the plan's next `steps` steps in new arrays, after checking them.
 
     Raises:
-        InputError: another number of steps or starts, or a number that is not finite.
+        InputError: the plan returns a wrong number of steps or starts, a value that is not finite, or wrong lines.
     """
     starts = len(plan.starts)
     check_memory(f"{steps} steps of {starts} starts", STEP_MEMORY * steps * starts)
@@ -119,9 +119,9 @@ def check_repeats(
     stride: Stride,
     acceleration: Acceleration | None = None,
 ) -> None:
-    """Raise InputError if a second plan differs from the first, as with random numbers without a seed.
+    """Raise InputError if two plans with the same arguments differ, as with random numbers without a seed.
 
-    The first `REPEATED` of the `steps` of a walk are compared, for starts (start, leg) [mm] and V_r, one or (start,).
+    Only the first `REPEATED` steps are compared. `starts` is (start, leg) [mm], `velocity` V_r, one number or (start,).
     """
     plans = [begin(controller, starts, velocity, stride, acceleration, threads=1) for _ in range(2)]
     first, second = (advanced(plan, min(steps, REPEATED)) for plan in plans)
@@ -129,7 +129,7 @@ def check_repeats(
 
 
 def check_same(first: PlannedWalk, second: PlannedWalk, what: str, before: int = 0) -> None:
-    """Raise InputError if two walks of the same starts, described by `what`, differ; `before` steps precede both."""
+    """Raise InputError if two walks, described by `what`, differ; in both, `before` steps precede the first one."""
     for name in (*PLANNED, "velocity"):
         a, b = getattr(first, name), getattr(second, name)
         if (bad := np.argwhere((a != b) & ~((a != a) & (b != b)))).size:
@@ -139,18 +139,18 @@ def check_same(first: PlannedWalk, second: PlannedWalk, what: str, before: int =
 
 
 def place(walk: PlannedWalk, at: Sequence[int], before: int = 0) -> str:
-    """Describe a place in a walk by step, start and leg; `before` steps precede the walk."""
+    """Describe the index `at`, (step, start, leg), of a walk in words; `before` steps precede the walk."""
     names = [f"step {before + at[0]}", *(f"start {start} (V = {walk.velocity[at[0], start]:.3g})" for start in at[1:2])]
     return ", ".join(names + [f"leg {LEGS[leg]}" for leg in at[2:]])
 
 
 def first_losses(plan: Plan, steps: int | np.ndarray, threads: int | None = None) -> np.ndarray:
-    """Return the first of each start's steps that is statically unstable (Eq. 7), (start,), from 1; 0 where none is.
+    """Return each start's first statically unstable step (Eq. 7), (start,), counted from 1; 0 if all are stable.
 
     Args:
-        plan: at time 0; the call consumes it.
-        steps: how far to look, (start,), or one number for all.
-        threads: by default one per core; the result does not depend on it.
+        plan: a plan at time 0; the call consumes it.
+        steps: number of steps to search, (start,), or one number for all starts.
+        threads: number of threads, by default one per core; the result does not depend on it.
     """
     fast = getattr(plan, "first_losses", None)
     if fast:
@@ -159,7 +159,7 @@ def first_losses(plan: Plan, steps: int | np.ndarray, threads: int | None = None
 
 
 def planned_losses(plan: Plan, steps: int | np.ndarray, threads: int | None = None) -> np.ndarray:
-    """Find the losses of `first_losses` by advancing the plan."""
+    """Return the result of `first_losses` by advancing the plan and computing the margin of each step."""
     steps = np.broadcast_to(steps, len(plan.starts))
     lost = np.zeros(len(steps), dtype=int)
     at_a_time = min(MOST_AT_ONCE, max(1, HELD // len(steps)))

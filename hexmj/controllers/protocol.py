@@ -1,8 +1,8 @@
-"""The interface of controllers: what a controller, its plans and the sensed state of the legs are.
+"""The interface of controllers, of their plans, and of the sensed state of the legs.
 
-Data goes one way. A controller begins a plan for many starts at once, the plan is advanced step by step and returns the
-tips. In a kinematic walk nothing comes back. In a physical walk a plan with a method `sense` receives the state of the
-legs before each step.
+A controller begins a plan for many starts at once; the plan is advanced step by step and returns the tips. A kinematic
+walk gives the plan no feedback. In a physical walk, a plan with a method `sense` receives the state of the legs before
+each step.
 """
 
 from dataclasses import dataclass, is_dataclass
@@ -19,60 +19,60 @@ from hexmj.walks import PlannedWalk
 
 @runtime_checkable
 class Plan(Protocol):
-    """A walk of many independent starts, planned as far as it was advanced.
+    """The walk of many independent starts, planned step by step.
 
-    A plan that lifts the feet itself may have an attribute `made_for`, the `Conditions` it fits; physical walks under
-    other conditions are then refused. A plan may have a method `first_losses(steps)`, called once at time 0: a faster
-    way to the result of `planning.planned_losses`.
+    A plan that sets the height of the feet may have an attribute `made_for`, the `Conditions` it is made for; physical
+    walks under other conditions then raise InputError. A plan may have a method `first_losses(steps)`, which is called
+    once, at time 0, and gives the result of `planning.planned_losses` faster.
     """
 
     starts: np.ndarray
     """(start, leg) tips at time 0 on their own axes, all standing [mm]."""
     stride: Stride
-    """Time step and lines of the tips."""
+    """Step range, lines of the tips and time step."""
     done: int
     """Number of steps planned so far."""
 
     def advance(self, steps: int) -> PlannedWalk:
-        """Return the next `steps` steps of all starts; the walk does not depend on how steps are divided into calls."""
+        """Return the next `steps` steps of all starts; several short calls give the same walk as one long call."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Sensed:
-    """What a robot can sense at the end of a step, for the n starts that still walk.
+    """The state of the legs that a robot can sense at the end of a step, for the n starts that still walk.
 
     Contact, load and torques are those at the beginning of the last physics step.
     """
 
     ids: np.ndarray
-    """(n,) indices of these starts in the plan."""
+    """(n,) index in the plan of each start that still walks."""
     tips: np.ndarray
-    """(n, leg, axis) tips by the joint angles, in the root frame: forward, left and up of O [mm]."""
+    """(n, leg, axis) tips computed from the joint angles, in the root frame: ahead of, left of and above O [mm]."""
     contact: np.ndarray
     """(n, leg) whether the ground carried the foot within the last `Conditions.contact_gap`."""
     gained: np.ndarray
-    """(n, leg) contact now, but not one step before."""
+    """(n, leg) whether the foot has contact now, but had none one step before."""
     lost: np.ndarray
-    """(n, leg) contact one step before, but not now."""
+    """(n, leg) whether the foot had contact one step before, but has none now."""
     load: np.ndarray
-    """(n, leg) normal force of the ground [g mm/s^2]; an insect of 1 g weighs 9810. Adhesion is subtracted: the load is
-    negative where adhesion holds a foot that pulls."""
+    """(n, leg) normal force of the ground minus adhesion [g mm/s^2], negative where adhesion holds a foot that pulls.
+    An insect of 1 g weighs 9810."""
     joints: np.ndarray
-    """(n, leg, joint) angles [rad]."""
+    """(n, leg, joint) joint angles [rad]."""
     torques: np.ndarray
-    """(n, leg, joint) of the servos [g mm^2/s^2]."""
+    """(n, leg, joint) torques of the servos [g mm^2/s^2]."""
     tilt: np.ndarray
     """(n, 2) angles by which the root's forward and left axes point below the horizontal [rad]."""
     velocity: np.ndarray
-    """(n, 3) velocity of the root along its heading, to its left and up [mm/s]."""
+    """(n, 3) velocity of the root: along its heading, to its left, and upward [mm/s]."""
     turning: np.ndarray
     """(n, 3) angular velocity of the root in its own frame [rad/s]."""
 
 
 @runtime_checkable
 class FeedbackPlan(Plan, Protocol):
-    """A plan with sensory feedback. In a kinematic walk `sense` is never called, and all goes as planned."""
+    """A plan with sensory feedback. In a kinematic walk `sense` is never called, and the legs move as planned."""
 
     def sense(self, sensed: Sensed) -> None:
         """Receive the state of the legs before the next step is planned."""
@@ -81,49 +81,49 @@ class FeedbackPlan(Plan, Protocol):
 
 @runtime_checkable
 class SteerablePlan(Plan, Protocol):
-    """A plan that can continue from other legs than its own, and restart. It owns the arrays it receives."""
+    """A plan that can continue from given tips and restart. It keeps the arrays that its methods receive."""
 
     @property
     def tips(self) -> np.ndarray:
-        """(start, leg) present tips on their own axes [mm]."""
+        """(start, leg) tips on their own axes after the last planned step [mm]."""
         ...
 
     @property
     def standing(self) -> np.ndarray:
-        """(start, leg) which legs retract now."""
+        """(start, leg) True for each leg that retracts after the last planned step."""
         ...
 
     def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
-        """Continue from these tips [mm] and states, both (start, leg)."""
+        """Continue from `tips`, (start, leg) [mm], with the legs in stance where `standing`, (start, leg), is True."""
         ...
 
     def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
-        """Put some starts, (start,) of bool, at time 0 again, all legs standing at `tips`, (start, leg) [mm].
+        """Put the starts where `which`, (start,), is True at time 0, all legs standing at `tips`, (start, leg) [mm].
 
-        They walk to the last bit like those of a plan from `begin` with these starts.
+        From then on they walk, to the last bit, like a new plan from `begin` that starts at `tips`.
         """
         ...
 
     def slow_down(self, which: np.ndarray) -> None:
-        """Let some starts, (start,) of bool, accelerate again from V_r(0); their legs do not change.
+        """Let the starts where `which`, (start,), is True accelerate again from V_r(0); their legs do not change.
 
-        Without an acceleration nothing changes.
+        The call has no effect if the plan has no acceleration.
         """
         ...
 
 
 @runtime_checkable
 class Controller(Protocol):
-    """A frozen dataclass whose fields are its settings: plain data that distinguish two controllers.
+    """A frozen dataclass whose fields are its settings: plain data, different for controllers that walk differently.
 
-    With an attribute `mirrored = True` it states that starts mirrored in the body axis give mirrored walks to the last
-    bit; `conformance` checks it. A method `check_velocity(velocity, stride)` may raise InputError before any work if
-    the time step is too long for V_r.
+    An attribute `mirrored = True` promises that starts mirrored in the body axis give mirrored walks to the last bit;
+    `conformance` checks it. A method `check_velocity(velocity, stride)` may raise InputError before a walk is planned
+    if the time step is too long for V_r.
     """
 
     @property
     def name(self) -> str:
-        """Name in tables and titles."""
+        """Name of the controller in tables and titles."""
         ...
 
     def begin(
@@ -134,25 +134,25 @@ class Controller(Protocol):
         acceleration: Acceleration | None = None,
         threads: int | None = None,
     ) -> Plan:
-        """Return a new plan, which depends on nothing but these arguments.
+        """Return a new plan, which depends only on the settings and these arguments.
 
         Args:
             starts: tips at time 0 on their own axes, all standing, (start, leg) [mm].
             velocity: V_r, or its final value when accelerating, (start,), 0 <= V_r < 1: per time unit a standing tip
-                moves V_r mm to the rear, and a swinging one 1 mm ahead.
+                moves V_r mm to the rear, and a swinging tip 1 mm ahead.
             stride: step range, lines of the tips and time step.
-            acceleration: Eq. 11; `timing.commanded_velocities` gives V_r at each step.
-            threads: by default one per core; the plan does not depend on it.
+            acceleration: Eq. 11, or None for constant V_r; `timing.commanded_velocities` gives V_r at each step.
+            threads: number of threads, by default one per core; the plan does not depend on it.
         """
         ...
 
 
 @runtime_checkable
 class SteerableController(Controller, Protocol):
-    """A controller whose plans are `SteerablePlan`s, as sensory feedback and disturbances need."""
+    """A controller whose plans are `SteerablePlan`s, which sensory feedback and disturbances require."""
 
     def begin_at_speed(self, starts, velocity, stride, acceleration=None, threads=None) -> SteerablePlan:
-        """Return a plan that walks at its final velocity from time 0; its arguments are those of `begin`.
+        """Return a plan that walks at its final velocity from time 0; the arguments are the same as of `begin`.
 
         The acceleration begins only with `slow_down` or `restart`.
         """
@@ -160,31 +160,31 @@ class SteerableController(Controller, Protocol):
 
 
 def check_steerable(controller: Controller) -> None:
-    """Raise InputError unless a controller is a `SteerableController`."""
+    """Raise InputError unless the controller is a `SteerableController`."""
     if not isinstance(controller, SteerableController):
-        raise InputError(f"{controller.name} cannot be disturbed: it has no begin_at_speed")
+        raise InputError(f"{controller.name} cannot be disturbed; expected a controller with begin_at_speed")
 
 
 def check_controller_type(controller: object) -> None:
-    """Raise InputError unless something is a controller: a frozen dataclass with a name and a method `begin`."""
+    """Raise InputError unless the object is a controller: a frozen dataclass with a name and a method `begin`."""
     if isinstance(controller, type) or not (is_dataclass(controller) and isinstance(controller, Controller)):
         raise InputError(
-            f"controller = {short(controller)}; expected a controller, as hexmj.LDVS or hexmj.load_controller gives one"
+            f"controller = {short(controller)}; expected a controller, such as hexmj.LDVS or load_controller(name)"
         )
 
 
 def settings_of(controller: Controller) -> dict[str, Any]:
-    """Return the settings of a controller as plain data: numbers, texts, lists and dicts.
+    """Return the settings of a controller as plain data: numbers, strings, lists and dicts.
 
     Raises:
-        InputError: a field is no plain data.
+        InputError: a field does not hold plain data.
     """
     check_controller_type(controller)
     return _without_classes(plain(controller))
 
 
 def _without_classes(value: Any) -> Any:
-    """Remove the names of classes from plain settings; a member of an enumeration becomes its name."""
+    """Return plain settings without class names; a member of an enumeration becomes the member's name."""
     if isinstance(value, dict):
         if value.keys() == {"class", "member"}:
             return value["member"]

@@ -22,25 +22,25 @@ from hexmj.files import SEARCHED, read_toml
 from hexmj.validate import short
 
 ENTRY_POINTS = "hexmj.controllers"
-"""Group of the entry points by which other packages provide controllers: a name and `module:object`."""
+"""Group of the entry points with which other packages register controllers: a name and `module:object`."""
 
 VARIED = re.compile(r"(?P<name>.+?)(?P<parts>(-(without|with)-\d)+)")
-"""Name of a controller without, or with, some of its mechanisms or rules, such as ldvs-without-3."""
+"""Pattern of a controller's name that switches mechanisms or rules off or on, such as ldvs-without-3."""
 
 
 def load_controller(name: str) -> Controller:
     """Return a controller by its name.
 
     Args:
-        name: a preset or a baseline; with ``-without-N`` without mechanism or rule N (``ldvs-without-3``), with
-            ``-with-N`` with mechanism 2 or 4 (``ldvs-with-2``); ``module:object`` or ``file.py:object``, a controller,
-            or a class whose fields all have defaults; an entry point of the group `ENTRY_POINTS`; or a TOML file with
-            the weights of a 1998 network, or with the name of a `controller` and a table of its `fields`. The file's
-            name becomes the controller's. Judge what a search has found on other starts than its own, those of seed 0
-            (for robust-0.3 and robust-0.7 also of 5 and 1), for example on those of 1998.
+        name: a preset, a baseline, or an entry point of the group `ENTRY_POINTS`; such a name with ``-without-N``
+            switches mechanism or rule N off (``ldvs-without-3``), with ``-with-N`` mechanism 2 or 4 on
+            (``ldvs-with-2``). Or ``module:object`` or ``file.py:object``: a controller, or a class whose fields all
+            have defaults. Or a TOML file with the weights of a 1998 network, or with the name of a `controller` and a
+            table of its `fields`; the file's name becomes the controller's name. Do not judge a controller that a
+            search found on the starts of its search: seed 0, for robust-0.3 also 5, for robust-0.7 also 1.
 
     Raises:
-        InputError: there is no such name, file, module or object, or the object is no controller.
+        InputError: the name, file, module or object does not exist, or the object is not a controller.
     """
     if name in PRESETS or name in BASELINES:
         return PRESETS.get(name) or BASELINES[name]
@@ -54,7 +54,7 @@ def load_controller(name: str) -> Controller:
         for how, which in re.findall(r"-(without|with)-(\d)", varied["parts"]):
             change = getattr(controller, {"without": "without", "with": "having"}[how], None)
             if change is None:
-                raise InputError(f"{controller.name} has no mechanisms or rules to be switched: {name}")
+                raise InputError(f"{controller.name} has no mechanisms or rules to switch off or on: {name}")
             controller = change(int(which))
         return controller
     if file := parameter_file(name):
@@ -67,23 +67,23 @@ def load_controller(name: str) -> Controller:
 
 
 def known_names() -> Iterator[str]:
-    """Names of the presets, the baselines and the entry points."""
+    """Yield the names of the presets, the baselines and the entry points."""
     yield from dict.fromkeys([*PRESETS, *BASELINES, *(point.name for point in entry_points(group=ENTRY_POINTS))])
 
 
 def parameter_file(name: str) -> Path | None:
-    """Return the TOML file that a controller's name means, or None if it means something else."""
+    """Return the path of the TOML file if the controller's name is that of an existing one, else None."""
     return Path(name) if name.endswith(".toml") and Path(name).is_file() else None
 
 
 def searched_on(name: str) -> dict[str, list[int]]:
-    """Return on which starts searches found a controller: there it looks better than it is.
+    """Return the seeds of the starts on which a controller was searched; on them it looks better than it is.
 
     Args:
-        name: as `load_controller` takes it, perhaps without some mechanisms.
+        name: a name for `load_controller`; switches such as ``-without-3`` are ignored.
 
     Returns:
-        Name of the search's result -> seeds of the starts of its search, and of those that it continued.
+        Name -> seeds of its search and of the earlier searches that it continued; empty if no search found it.
     """
     varied = VARIED.fullmatch(name)
     base = varied["name"] if varied else name
@@ -94,22 +94,22 @@ def searched_on(name: str) -> dict[str, list[int]]:
 
 
 def _object(where: str, what: str, name: str) -> Controller:
-    """Return an object of a module or file, or an instance of a class with its defaults."""
+    """Return the object `what` of the module or file `where`; a class is instantiated with its defaults."""
     module = _module(where)
     found: Any = getattr(module, what, None)
     if found is None:
         offered = [key for key, value in vars(module).items() if is_dataclass(value) and hasattr(value, "begin")]
-        raise InputError(f"controller {name!r} is not found; controllers there: {', '.join(offered) or 'none'}")
+        raise InputError(f"controller {name!r} is not found; controllers in {where}: {', '.join(offered) or 'none'}")
     try:
         found = found() if isinstance(found, type) else found
         check_controller_type(found)
-    except (InputError, TypeError) as error:  # a field without a default
+    except (InputError, TypeError) as error:  # TypeError: a field has no default
         raise InputError(f"{name}: {error}") from error
     return found
 
 
 def _module(where: str) -> ModuleType:
-    """Import a module, or a file that ends in .py as a module of its own name, also for worker processes."""
+    """Import a module or a .py file; the file's directory joins sys.path, so that worker processes import it too."""
     path = Path(where).absolute()
     if path.suffix == ".py" and str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
@@ -118,32 +118,32 @@ def _module(where: str) -> ModuleType:
     except (ImportError, SyntaxError, ValueError) as error:
         raise InputError(f"{where} cannot be imported: {error!r}") from error
     if path.suffix == ".py" and not path.samefile(str(module.__file__)):
-        raise InputError(f"{path}: there is another module {path.stem!r}, {module.__file__}; rename the file")
+        raise InputError(f"{path}: the module {path.stem!r} already exists, {module.__file__}; rename the file")
     return module
 
 
 def _from_table(path: Path, table: dict[str, Any]) -> Controller:
-    """Return the controller that a file names with the fields that it gives, named like the file by default."""
+    """Return the controller of a parameter file's table with the file's fields; its default name is the file's."""
     if unknown := table.keys() - {"controller", "fields", SEARCHED}:
-        raise InputError(f"{path} holds {', '.join(unknown)}; expected controller and a table [fields]")
-    usual: Any = load_controller(table["controller"])
+        raise InputError(f"{path} has the keys {', '.join(unknown)}; expected only controller and a table [fields]")
+    default: Any = load_controller(table["controller"])
     values = table.get("fields", {})
-    if values and "name" in usual.__dataclass_fields__:
+    if values and "name" in default.__dataclass_fields__:
         values = {"name": path.stem} | values
     try:
-        return _changed(usual, values)
+        return _changed(default, values)
     except (ValueError, TypeError, KeyError) as error:
         raise InputError(f"{path} [fields]: {error}") from None
 
 
-def _changed(usual: Any, values: dict[str, Any]) -> Any:
-    """Return a dataclass with values of a TOML table, each of the type of the usual value.
+def _changed(default: Any, values: dict[str, Any]) -> Any:
+    """Return the dataclass `default` with the values of a TOML table, each converted to the type of the default.
 
-    A member of an enumeration is given by its name, a tuple by a list, and a dataclass by a table of changed fields.
+    The table gives a member of an enumeration by its name, a tuple as a list, a dataclass as a table of its fields.
     """
     changes = {}
     for name, value in values.items():
-        match getattr(usual, name, None):
+        match getattr(default, name, None):
             case Enum() as old:
                 changes[name] = type(old)[value]
             case tuple() | Path() as old:
@@ -158,4 +158,4 @@ def _changed(usual: Any, values: dict[str, Any]) -> Any:
                 changes[name] = value
             case old:
                 raise InputError(f"{name} = {short(value)}; expected a value like {short(old)}")
-    return replace(usual, **changes)
+    return replace(default, **changes)

@@ -1,4 +1,4 @@
-"""A plan made from a function of one step, and for sensory feedback from a function of what is sensed."""
+"""Plans made from a function that computes one step, with optional sensory feedback."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -16,18 +16,18 @@ from hexmj.walks import PLANNED, PlannedWalk
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """The legs at the end of one step; each value is (start, leg), or broadcasts to it."""
+    """The legs at the end of one step; each field is an array (start, leg), or broadcasts to it."""
 
     x: ArrayLike
-    """Tips on their own axes [mm]."""
+    """Tips on the legs' own axes [mm]."""
     stance: ArrayLike
-    """Which legs stand."""
+    """True for legs that stand."""
     y: ArrayLike | None = None
-    """Tips beside the body axis, left positive [mm]; by default on the lines of the legs."""
+    """Distance of the tips from the body axis, left positive [mm]; by default that of the legs' lines."""
     aep: ArrayLike | None = None
-    """End of the present swing on the leg's own axis [mm]; by default AEP_0."""
+    """Tip at the end of the present swing, on the leg's own axis [mm]; by default AEP_0."""
     height: ArrayLike | None = None
-    """Height of the tips above the ground [mm]; the body lifts tips with NaN, by default all."""
+    """Height of the tips above the ground [mm]; where NaN, the default, the body itself lifts and lowers the foot."""
 
 
 @dataclass(eq=False)
@@ -35,7 +35,7 @@ class StepwisePlan:
     """A `protocol.Plan` that calls a function for each step; with `sense` it is a `protocol.FeedbackPlan`."""
 
     step: Callable[[np.ndarray], Step]
-    """See `stepwise`."""
+    """Function that computes each step, see `stepwise`."""
     starts: np.ndarray
     """(start, leg) tips at time 0 [mm]."""
     velocity: np.ndarray
@@ -43,19 +43,19 @@ class StepwisePlan:
     stride: Stride
     """Step range, lines of the tips and time step."""
     acceleration: Acceleration | None
-    """Eq. 11."""
+    """Acceleration of Eq. 11, or None for constant V_r."""
     age: int | np.ndarray = 0
-    """Steps since the acceleration began, (start,) or one number."""
+    """Number of steps since the acceleration began, (start,) or one number."""
     done: int = 0
-    """Steps planned so far."""
+    """Number of steps planned so far."""
     sense: Callable[[Sensed], None] = field(init=False, repr=False)
-    """Receives the state of the legs before the next step is planned."""
+    """Function that receives the sensed legs before each step; the attribute is missing without feedback."""
 
     def advance(self, steps: int) -> PlannedWalk:
         """Return the next `steps` steps.
 
         Raises:
-            InputError: the function returns no `Step`, or values that do not broadcast to (start, leg).
+            InputError: the function `step` does not return a `Step`, or a field does not broadcast to (start, leg).
         """
         stride, shape = self.stride, (steps, *self.starts.shape)
         v = np.array(commanded_velocities(self.velocity, self.age, steps, stride, self.acceleration))
@@ -64,7 +64,7 @@ class StepwisePlan:
         for n, now in enumerate(v):
             step = self.step(now.copy())
             if not isinstance(step, Step):
-                raise InputError(f"the function of a step returned {short(step)}; expected a Step")
+                raise InputError(f"the function step returned {short(step)}; expected a Step")
             for name, values in planned.items():
                 value = getattr(step, name)
                 try:
@@ -85,15 +85,15 @@ def stepwise(
     acceleration: Acceleration | None = None,
     sense: Callable[[Sensed], None] | None = None,
 ) -> StepwisePlan:
-    """Return a plan from a function that is called once for every step, in order.
+    """Return a plan that calls a function once for every step, in order.
 
     Args:
-        step: takes V_r of every start during the step, (start,), and returns the legs at its end.
-        starts: those of `protocol.Controller.begin`, as are the next three.
-        velocity: V_r, or its final value when accelerating.
+        step: function that takes V_r of every start during the step, (start,), and returns the legs at its end.
+        starts: tips at time 0 on their own axes, all standing, (start, leg) [mm].
+        velocity: V_r, or its final value when accelerating, (start,) or one number.
         stride: step range, lines of the tips and time step.
-        acceleration: Eq. 11.
-        sense: gives the plan sensory feedback; receives the state of the legs before each step of a physical walk.
+        acceleration: Eq. 11, or None for constant V_r.
+        sense: function for sensory feedback: it receives the sensed legs before each step of a physical walk.
 
     Raises:
         InputError: a start or velocity is out of range.

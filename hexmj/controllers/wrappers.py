@@ -1,4 +1,4 @@
-"""Controllers around another one: their base classes, and impairments: a lost leg, and noisy or late senses."""
+"""Controllers that wrap another controller: base classes, a lost leg, and noisy or delayed senses."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from hexmj.validate import number, whole
 from hexmj.walks import PlannedWalk
 
 RISE = 3.0
-"""How fast the lost leg is raised as the walk begins [mm / time unit], three times as fast as tips swing ahead."""
+"""Speed at which the lost leg is raised at the beginning of the walk [mm / time unit]: three times V_p."""
 
 
 @dataclass(frozen=True)
@@ -22,33 +22,33 @@ class Wrapper:
     """Base class of controllers whose plans wrap those of another controller."""
 
     controller: Controller
-    """Plans the steps."""
+    """The wrapped controller, which plans the steps."""
 
     def __post_init__(self) -> None:
         check_controller_type(self.controller)
 
     def check_velocity(self, velocity: float, stride: Stride) -> None:
-        """As the controller within, see `protocol.Controller`."""
+        """Raise InputError if the wrapped controller refuses this V_r with this time step."""
         check_velocities(self.controller, [velocity], stride)
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> Plan:
         """See `protocol.Controller.begin`.
 
         Raises:
-            InputError: the plan of the controller within cannot be wrapped.
+            InputError: the plan of the wrapped controller does not suit this wrapper.
         """
         return self.wrap(self.controller.begin(starts, velocity, stride, acceleration, threads))
 
     def wrap(self, plan: Any) -> Plan:
-        """Return a plan around one at time 0."""
+        """Return a new plan that wraps `plan`, a plan at time 0."""
         raise NotImplementedError
 
 
 class WrappedPlan:
-    """Base class of plans around another one; as it is, it gives the same steps."""
+    """Base class of plans that wrap another plan; without changes it returns the steps of the wrapped plan."""
 
     def __init__(self, plan: Any) -> None:
-        """Wrap a plan at time 0."""
+        """Wrap a plan that is at time 0."""
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
         self._plan, self.made_for = plan, getattr(plan, "made_for", None)
 
@@ -61,15 +61,15 @@ class WrappedPlan:
 
 @dataclass(frozen=True)
 class LegLost(Wrapper):
-    """A controller that has lost a leg and does not know it: the leg is held up.
+    """A controller that plans for six legs although one leg is lost: the lost leg is held in the air.
 
-    A body that tips far enough onto the leg comes down on it.
+    A body that tips far enough toward the lost leg still lands on it.
     """
 
     leg: int
     """Index of the lost leg."""
     held: float = 12.0
-    """Height at which the leg is held [mm]; kinematic results do not depend on it."""
+    """Height at which the lost leg is held [mm]; kinematic results do not depend on it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -78,26 +78,26 @@ class LegLost(Wrapper):
 
     @property
     def name(self) -> str:
-        """The controller's name, and what is different."""
+        """Name of the wrapped controller, and number of the lost leg."""
         return f"{self.controller.name}, leg {self.leg + 1} lost"
 
     def wrap(self, plan: Any) -> "LamePlan":
-        """See `Wrapper`."""
+        """Return a `LamePlan` around a plan at time 0."""
         return LamePlan(plan, self.leg, self.held)
 
 
 class LamePlan(WrappedPlan):
-    """A plan of which one leg is held up; it senses what the plan within does, the lost leg included."""
+    """A plan that holds one leg up; the wrapped plan senses all six legs, including the lost one."""
 
     def __init__(self, plan: Any, leg: int, held: float) -> None:
-        """Wrap a plan at time 0; `held` is the leg's height [mm]."""
+        """Wrap a plan that is at time 0; `leg` is the index of the lost leg, `held` its height [mm]."""
         super().__init__(plan)
         self._leg, self._held = leg, held
         if isinstance(plan, FeedbackPlan):
             self.sense = plan.sense
 
     def advance(self, steps: int) -> PlannedWalk:
-        """Return the next steps; the lost leg moves to and fro in the air."""
+        """Return the next steps, in which the lost leg moves forward and back in the air."""
         walk = super().advance(steps)
         stance, height = walk.stance.copy(), walk.height.copy()
         stance[..., self._leg] = False
@@ -107,16 +107,16 @@ class LamePlan(WrappedPlan):
 
 @dataclass(frozen=True)
 class PoorSenses(Wrapper):
-    """A controller with sensory feedback that senses its tips with noise, or everything late.
+    """A controller with sensory feedback that senses its tips with noise, or all its senses with a delay.
 
-    Controllers that sense only loads or contacts, as some baselines do, are not affected by the noise.
+    The noise does not affect controllers that sense only loads or contacts, as some baselines do.
     """
 
     noise: float = 0.0
-    """Standard deviation of the error of each coordinate of each tip, drawn independently at every step, as a fraction
-    of AEP_0 - PEP_0."""
+    """Standard deviation of the noise that is added to each coordinate of each sensed tip, independently at every step,
+    as a fraction of AEP_0 - PEP_0."""
     delay: float = 0.0
-    """Delay of everything that is sensed [time units], rounded to steps of the plan."""
+    """Delay of all senses [time units], rounded to whole steps of the plan."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -125,31 +125,31 @@ class PoorSenses(Wrapper):
 
     @property
     def name(self) -> str:
-        """The controller's name, and what is different."""
+        """Name of the wrapped controller, noise and delay."""
         return f"{self.controller.name}, noise {self.noise:g}, delay {self.delay:g}"
 
     def wrap(self, plan: Any) -> "PoorlySensedPlan":
-        """See `Wrapper`."""
+        """Return a `PoorlySensedPlan` around a plan at time 0; raise InputError if that plan has no feedback."""
         stride, late = plan.stride, round(self.delay / plan.stride.dt)
         if self.delay and not late:
-            raise InputError(f"delay = {self.delay:g}; expected at least one step of {stride.dt:g} time units")
+            raise InputError(f"delay = {self.delay:g}; expected 0 or at least one step of {stride.dt:g} time units")
         if not isinstance(plan, FeedbackPlan):
-            raise InputError(f"poor senses of {self.controller.name}; expected a controller with sensory feedback")
+            raise InputError(f"{self.controller.name} has no senses; expected a controller with sensory feedback")
         return PoorlySensedPlan(plan, self.noise * (stride.aep0 - stride.pep0), late)
 
 
 class PoorlySensedPlan(WrappedPlan):
-    """A `protocol.FeedbackPlan` that senses with noise or late; the noise of a start depends only on its tips."""
+    """A `protocol.FeedbackPlan` with noise and delay; the seed of a start's noise is given by its tips at time 0."""
 
     def __init__(self, plan: FeedbackPlan, error: float, late: int) -> None:
-        """Wrap a plan at time 0, with a standard deviation [mm] and a delay in steps."""
+        """Wrap a plan at time 0; `error` is the standard deviation of the noise [mm], `late` the delay in steps."""
         super().__init__(plan)
         self._draws = [np.random.default_rng(np.frombuffer(start.tobytes(), np.uint32)) for start in plan.starts]
         self._coming: deque[Sensed] = deque()
         self._error, self._late = error, late
 
     def sense(self, sensed: Sensed) -> None:
-        """Pass on what was sensed some steps ago; nothing until then."""
+        """Pass the state sensed `late` steps ago to the wrapped plan; pass nothing in the first `late` steps."""
         if self._error:
             errors = [self._draws[i].standard_normal(sensed.tips.shape[1:]) for i in sensed.ids]
             sensed = replace(sensed, tips=sensed.tips + self._error * np.array(errors))
