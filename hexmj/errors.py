@@ -5,26 +5,26 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """An argument, option or file that makes no sense; the message names it, its value and what is expected."""
+    """Raised if an argument, option or file is invalid; the message says its name, its value and what is allowed."""
 
 
 class OutOfReach(InputError):
-    """A plan whose tips a body cannot reach."""
+    """Raised if foot targets of a plan are out of the body's reach."""
 
 
 class Refused(InputError):
-    """A controller that does not walk with its settings, at a velocity or with a time step."""
+    """Raised if a controller cannot walk with its settings, the velocity or the time step."""
 
 
 class StillThrown(InputError):
-    """A walk that ends while a push still acts, so that its outcome is unknown."""
+    """Raised if a walk ends while a push still acts, so that the outcome is unknown."""
 
 
 class SimulationError(RuntimeError):
-    """A physical simulation that did not settle or diverged. It is never counted as an outcome."""
+    """Raised if a physical simulation does not settle, or diverges; it never counts as an outcome."""
 
     def __init__(self, message: str, state: Mapping[str, Any] | None = None) -> None:
-        """Keep the last finite state, if it is known."""
+        """Store the message and the last finite state, if it is known."""
         super().__init__(message, state)
         self.message, self.state = message, dict(state or {})
 
@@ -33,9 +33,9 @@ class SimulationError(RuntimeError):
 
 
 class RenderingError(RuntimeError):
-    """A film that cannot be rendered on this machine; the message names the missing package."""
+    """Raised if this machine cannot render a film; the message names the missing package."""
 
 
 def without_extra(extra: str, library: str) -> InputError:
-    """Return the error for a missing optional library; it names the extra that installs it."""
+    """Return the InputError for a missing library, which names the extra of hexmj that installs it."""
     return InputError(f"{library} is not installed; in a checkout of hexmj: pip install '.[{extra}]'")

@@ -1,8 +1,7 @@
 """Static stability (paper, Section 3): support polygon, signed stability margin, first loss.
 
-The general polygon, for planned and measured walks alike.  The compiled network decides stability in
-the same pass by a closed form that holds for the paper's geometry (`controllers.cruse1998.kernel`); a test holds the
-two against each other.
+The functions take any feet, planned or measured.  The compiled network decides about stability by a closed form
+that holds only for the paper's geometry (`controllers.cruse1998.kernel`); a test compares both.
 """
 
 from typing import Any
@@ -17,27 +16,27 @@ from hexmj.validate import numbers, states
 from hexmj.walks import Walk
 
 ROUNDING = 4.0 * 2.0**-53
-"""Bounds the error of a difference of two products, relative to the sum of their sizes (Shewchuk 1997, orient2d):
-within it a foot counts as lying on the line."""
+"""Maximum rounding error of a difference of two products, relative to the sum of their magnitudes (Shewchuk 1997,
+orient2d); a foot that is no farther from a line counts as lying on it."""
 
 BLOCK = 4096
-"""Postures that one thread computes at a time."""
+"""Number of postures that one thread computes at a time."""
 
 
 def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = None) -> np.ndarray:
-    """Signed distance from the centre of mass to the nearest edge of the support polygon.
+    """Return the signed distance from the centre of mass to the nearest edge of the support polygon.
 
     Args:
-        feet: tips seen from the projected centre of mass, (..., leg, 2) [mm].
-        stance: which of them stand, (..., leg).
-        threads: one per core unless given.
+        feet: tips relative to the projected centre of mass, (..., leg, 2) [mm].
+        stance: True for feet that stand, (..., leg).
+        threads: number of threads, by default one per core.
 
     Returns:
         (...) [mm]: positive if and only if the centre of mass lies strictly within the polygon (Section 3),
-        negative outside, where fewer than three feet stand too; -inf where none does.
+        else 0 or negative, as with fewer than three standing feet; -inf if no foot stands.
 
     Raises:
-        InputError: shapes that do not fit, or a standing foot at NaN.
+        InputError: the shapes do not fit together, or a standing foot is not finite.
     """
     tips, stands = _checked(feet, stance)
     if stands.shape[-1:] != (6,):
@@ -46,7 +45,7 @@ def stability_margin(feet: ArrayLike, stance: ArrayLike, threads: int | None = N
 
 
 def _checked(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Return feet, (..., leg, 2), and stance, (..., leg), if their shapes fit and all standing feet are known."""
+    """Return feet, (..., leg, 2), and stance, (..., leg), if their shapes fit and all standing feet are finite."""
     tips, stands = numbers("feet", feet), states("stance", stance)
     if tips.shape != (*stands.shape, 2):
         raise InputError(f"feet {tips.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg)")
@@ -56,7 +55,7 @@ def _checked(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray
 
 
 def _margins(tips: np.ndarray, stands: np.ndarray, threads: int | None) -> np.ndarray:
-    """Return `stability_margin` of valid postures."""
+    """Return the stability margins of postures that are known to be valid, see `stability_margin`."""
     points, standing = np.ascontiguousarray(tips).reshape(-1, 6, 2), stands.reshape(-1, 6)
     margin = np.empty(len(points))
 
@@ -71,16 +70,16 @@ def _margins(tips: np.ndarray, stands: np.ndarray, threads: int | None) -> np.nd
 
 
 def walk_margin(walk: Walk, threads: int | None = None) -> np.ndarray:
-    """The stability margin after each step, (step, start) [mm]; NaN where no tip is known (after a fall)."""
+    """Return the stability margin after each step, (step, start) [mm]; NaN if all tips are NaN, as after a fall."""
     margin = _margins(walk.feet, walk.stance, threads)
     return np.where(np.isnan(walk.x + walk.y).all(axis=-1), np.nan, margin)
 
 
 def loss_time(walk: Walk, threads: int | None = None) -> np.ndarray:
-    """Time of the first loss of static stability (Eq. 7), (start,) [time units]; inf where there is none.
+    """Return the time of the first loss of static stability (Eq. 7), (start,) [time units]; inf without a loss.
 
     Raises:
-        InputError: a walk without steps.
+        InputError: the walk has no steps.
     """
     lost = walk_margin(walk, threads) <= 0.0
     if not len(lost):
@@ -89,14 +88,14 @@ def loss_time(walk: Walk, threads: int | None = None) -> np.ndarray:
 
 
 def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
-    """Corners of the support polygon of one posture, counter-clockwise, (corner, 2) [mm].
+    """Return the corners of the support polygon of one posture, counter-clockwise, (corner, 2) [mm].
 
     Args:
         feet: tips, (leg, 2) [mm].
-        stance: which of them stand, (leg,).
+        stance: True for feet that stand, (leg,).
 
     Raises:
-        InputError: shapes that do not fit, or a standing foot at NaN.
+        InputError: the shapes do not fit together, or a standing foot is not finite.
     """
     tips, stands = _checked(feet, stance)
     if stands.ndim != 1:
@@ -108,15 +107,15 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
 
     try:
         return points[ConvexHull(points - points[0]).vertices]
-    except QhullError:  # all lie on one line
+    except QhullError:  # all feet lie on one line
         return points
 
 
 @jitted
 def margins(feet: Any, stance: Any, margin: Any) -> None:
-    """`stability_margin` of postures (posture, leg, 2), for compiled code.
+    """Write the stability margins of postures, (posture, leg, 2), to `margin`, (posture,); for compiled code.
 
-    The line through two standing feet carries an edge of the polygon if all others lie on one side of it.
+    Two standing feet are the ends of an edge of the polygon if all other standing feet lie on one side of their line.
     """
     for n in range(len(feet)):
         f, s = feet[n], stance[n]
@@ -134,18 +133,18 @@ def margins(feet: Any, stance: Any, margin: Any) -> None:
                 left = right = False
                 for c in range(6):
                     if s[c]:
-                        one, other = ex * (f[c, 1] - f[a, 1]), ey * (f[c, 0] - f[a, 0])
-                        doubt = ROUNDING * (abs(one) + abs(other))
-                        left |= one - other > doubt
-                        right |= other - one > doubt
+                        along_y, along_x = ex * (f[c, 1] - f[a, 1]), ey * (f[c, 0] - f[a, 0])
+                        error = ROUNDING * (abs(along_y) + abs(along_x))
+                        left |= along_y - along_x > error
+                        right |= along_x - along_y > error
                 if left and right:
                     continue
-                side = ey * f[a, 0] - ex * f[a, 1]  # of the centre of mass
+                side = ey * f[a, 0] - ex * f[a, 1]  # on which the centre of mass lies
                 inside &= (left and side > 0.0) or (right and side < 0.0)
                 along = -(f[a, 0] * ex + f[a, 1] * ey) / length
                 along = min(max(along, 0.0), 1.0)
                 nearest = min(nearest, np.hypot(f[a, 0] + along * ex, f[a, 1] + along * ey))
-        if nearest == np.inf:  # all standing feet are in one place
+        if nearest == np.inf:  # all standing feet are at one point
             inside = False
             for a in range(6):
                 if s[a]:

@@ -1,4 +1,4 @@
-"""Random initial leg configurations (starts), all legs standing (paper, Section 3); checks of starts and velocities."""
+"""Draw random initial leg configurations (starts; paper, Section 3), and check starts and velocities."""
 
 from collections.abc import Iterator, Sequence
 
@@ -10,52 +10,52 @@ from hexmj.timing import Acceleration, Stride
 from hexmj.validate import distinct, leg_last, numbers, short, whole
 
 SAMPLE = 1000
-"""Starts of one sample of the paper's protocol; it takes seven of them."""
+"""Number of starts of one sample in the paper, which takes seven samples."""
 
 SLAB = 64 * SAMPLE
-"""Starts that are drawn and held in memory at a time where only their losses are counted."""
+"""Maximum number of starts in memory at a time, where only losses are counted."""
 
 MOST_STARTS = 10**10
-"""Most starts of one FLSS; on two cores they take hours to days."""
+"""Maximum number of starts of one FLSS; on two cores they take hours to days."""
 
 MOST_DRAWN = 10**8
-"""Most starts in one array; their tips take 5 GB."""
+"""Maximum number of starts in one array; their tips take 5 GB."""
 
 
 def draw_starts(n_starts: int, seed: int, stride: Stride | None = None) -> np.ndarray:
-    """Starts drawn uniformly from S: all legs stand between PEP_0 and AEP_0 (Section 3).
+    """Return starts drawn uniformly from S: all legs stand between PEP_0 and AEP_0 (Section 3).
 
     Returns:
         (start, leg) [mm].  The first k of n starts are the same for every n.
 
     Raises:
-        InputError: a number of starts or a seed that makes no sense.
+        InputError: the number of starts or the seed is out of range.
     """
     n_starts, seed = whole("n_starts", n_starts, 1, MOST_DRAWN), whole("seed", seed, 0)
     return np.concatenate(list(draw_slabs(n_starts, seed, stride or Stride())))
 
 
 def draw_start(start: int, seed: int, stride: Stride) -> np.ndarray:
-    """One of the starts of `draw_starts`, (1, leg) [mm], without those before it.
+    """Return the start of index `start` that `draw_starts` draws, (1, leg) [mm], without drawing the starts before it.
 
     Raises:
-        InputError: a number or a seed that makes no sense.
+        InputError: the index or the seed is out of range.
     """
     start, seed = whole("start", start, 0, MOST_STARTS), whole("seed", seed, 0)
     return next(draw_slabs(1, seed, stride, start))
 
 
 def draw_slabs(n_starts: int, seed: int, stride: Stride, first: int = 0) -> Iterator[np.ndarray]:
-    """The starts of `draw_starts` from `first` on, (start, leg) [mm], `SLAB` at a time, without those before them."""
+    """Yield the starts of `draw_starts` from index `first` on, in arrays (start, leg) [mm] of at most `SLAB` starts."""
     source = np.random.PCG64(seed)
-    source.advance(6 * first)  # a tip takes one step of it
+    source.advance(6 * first)  # each tip advances the generator by one
     rng = np.random.Generator(source)
     for begin in range(0, n_starts, SLAB):
         yield rng.uniform(stride.pep0, stride.aep0, (min(SLAB, n_starts - begin), 6))
 
 
 def check_draw(n_starts: int, seed: int, name: str = "n_starts", seed_name: str = "seed") -> tuple[int, int]:
-    """Return a number of starts and a seed if both are valid."""
+    """Return a number of starts and a seed if both are in range; the names are for the error message."""
     return whole(name, n_starts, 1, MOST_STARTS), whole(seed_name, seed, 0)
 
 
@@ -82,7 +82,7 @@ def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceler
 
 
 def checked_list(velocities: Sequence[float], acceleration: Acceleration | None = None) -> np.ndarray:
-    """Return the velocities of a table, (velocity,), if there is at least one and all are distinct."""
+    """Return the velocities of a study, (velocity,), if they are valid and distinct, and at least one is given."""
     v = np.atleast_1d(numbers("velocities", velocities))
     distinct("velocities", v.tolist())
     return checked_velocities(v, len(v), acceleration)

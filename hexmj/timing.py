@@ -1,6 +1,6 @@
-"""Stride, periods and times: how far legs step, how finely time is divided, and for how long a walk is observed.
+"""Step range, time step, acceleration (Eq. 11) and observation time of a walk.
 
-The time unit is 1 mm / V_p: in one, a protracting tip moves 1 mm.  Velocities V are fractions of V_p.
+A time unit is 1 mm / V_p: the time in which a protracting tip moves 1 mm.  Velocities V are fractions of V_p.
 """
 
 import math
@@ -18,21 +18,21 @@ OBSERVATION_TIMES = ("walk", "start")
 """Named observation times, see `observation_duration`."""
 
 MOST_STEPS = 10**7
-"""Longest walk [steps]."""
+"""Maximum number of steps of a walk."""
 
 AT_SPEED = 10**9
-"""Steps after which every acceleration has ended."""
+"""Number of steps after which every acceleration has ended."""
 
 LEAST_STEP = 1e-5
-"""Shortest time step of a plan [time units]; a ten-thousandth of the usual one."""
+"""Minimum time step of a plan [time units]: a ten-thousandth of the default."""
 
 FAR = 1e6
-"""Greatest coordinate of a tip, beyond the reach of any leg [mm]."""
+"""Maximum magnitude of AEP_0, PEP_0 and PEP_min [mm], beyond the reach of any leg."""
 
 
 @dataclass(frozen=True)
 class Stride:
-    """Where tips step and how time is divided, the same for every controller; all are inferred (docs/constants.md)."""
+    """Step range, lines of the tips and time step of every controller; all are inferred (docs/constants.md)."""
 
     aep0: float = 10.0
     """Anterior extreme position without influences, on each leg's own axis [mm]."""
@@ -41,9 +41,9 @@ class Stride:
     pep_min: float = -20.0
     """Rearmost posterior extreme position [mm]."""
     dt: float = 0.1
-    """Time step of a plan, of Eq. 6 for the network [time units; in one, a protracting tip moves 1 mm]."""
+    """Time step of a plan, dt in Eq. 6 [time units; a protracting tip moves 1 mm per time unit]."""
     geometry: Geometry = field(default=FIG1)
-    """Lines of the tips: fig1, as in Fig. 1 (`FIG1`), or centred (`CENTRED`), with the centre of mass above O_2."""
+    """Lines of the tips: fig1 (`FIG1`) as in Fig. 1, or centred (`CENTRED`) with the centre of mass above O_2."""
 
     def __post_init__(self) -> None:
         for name in ("aep0", "pep0", "pep_min"):
@@ -55,18 +55,18 @@ class Stride:
             )
 
     def periods(self, velocity: Any, count: float = 1.0) -> Any:
-        """Duration of some periods of a single leg at V_r, (AEP_0 - PEP_0) (1 + 1/V) each [time units]."""
+        """Return the duration of `count` periods (AEP_0 - PEP_0) (1 + 1/V) of a single leg at V_r [time units]."""
         return count * (self.aep0 - self.pep0) * (1.0 + 1.0 / velocity)
 
 
 @dataclass(frozen=True)
 class Acceleration:
-    """The accelerating procedure, Eq. 11: V_r grows from `start` with `rate` up to the velocity of the walk."""
+    """The accelerating procedure, Eq. 11: V_r grows from `start` at `rate` up to the final velocity of the walk."""
 
     rate: float = 0.00008
-    """a [1 / time unit]; the paper's 0.00008."""
+    """a in Eq. 11: growth of V_r [1 / time unit]; 0.00008 in the paper."""
     start: float = 0.1
-    """V_r(0), as a fraction of V_p; inferred."""
+    """V_r(0), the velocity at time 0 as a fraction of V_p; inferred."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(number("rate", self.rate)) and self.rate > 0):
@@ -75,21 +75,19 @@ class Acceleration:
             raise InputError(f"start = {self.start}; expected 0 <= V_r(0) < 1")
 
     def duration(self, velocity: Any) -> Any:
-        """Time until V_r is reached [time units]."""
+        """Return the time until V_r reaches `velocity` [time units]."""
         return (velocity - self.start) / self.rate
 
 
 def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Acceleration | None) -> None:
-    """Raise InputError if V_r, (...) fractions of V_p, and the growth of V in a time step (Eq. 11) reach 1 together."""
+    """Raise InputError if a V_r plus its growth in one time step (Eq. 11) is 1 or more."""
     if acceleration and not (velocity + acceleration.rate * stride.dt < 1.0).all():
         step = acceleration.rate * stride.dt
-        raise InputError(
-            f"V = {velocity.max():g} is reached in steps of {step:g}; expected V and a step below 1 together"
-        )
+        raise InputError(f"V = {velocity.max():g} grows by {step:g} in a time step; expected a sum below 1")
 
 
 def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acceleration | None) -> None:
-    """Raise InputError if V_r, (velocity,), is not reached by Eq. 11 within a time, (velocity,) [time units]."""
+    """Raise InputError if Eq. 11 does not reach a V_r, (velocity,), within its duration, (velocity,) [time units]."""
     if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity) * (1.0 - 1e-9))).size:
         v, end = velocity[late[0]], duration[late[0]]
         reached = f"V = {v:g} is reached at {acceleration.duration(v):g} time units"
@@ -99,11 +97,11 @@ def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acce
 def observation_duration(
     observation_time: str | float, velocity: ArrayLike, stride: Stride, acceleration: Acceleration | None = None
 ) -> np.ndarray:
-    """Return the time t of Eq. 7 for each velocity [time units], which the paper leaves open.
+    """Return the observation time, t in Eq. 7, for each velocity [time units]; the paper leaves it open.
 
     'walk' is three periods of a single leg oscillator, 3 (AEP_0 - PEP_0) (1 + 1/V); 'start' is
-    2 (AEP_0 - PEP_0) / V_p. When accelerating, a named observation time begins when V is reached; a number is the whole
-    time.
+    2 (AEP_0 - PEP_0) / V_p. With an acceleration, these count from the moment when V is reached; a number counts from
+    time 0.
 
     Raises:
         InputError: there is no such observation time, or V is 0 with the observation time 'walk'.
@@ -119,10 +117,10 @@ def observation_duration(
 
 
 def steps_within(duration: ArrayLike, stride: Stride) -> np.ndarray:
-    """Return the whole steps of a plan within an observation time [time units].
+    """Return the number of whole steps of a plan within a duration [time units].
 
     Raises:
-        InputError: the time is shorter than a step, or longer than `MOST_STEPS`.
+        InputError: the duration is shorter than one step, or longer than `MOST_STEPS` steps.
     """
     duration, dt = numbers("duration", duration), stride.dt
     if (odd := duration[~((duration >= dt) & (duration <= MOST_STEPS * dt))]).size:
@@ -133,14 +131,14 @@ def steps_within(duration: ArrayLike, stride: Stride) -> np.ndarray:
 def commanded_velocities(
     velocity: np.ndarray, done: int | np.ndarray, steps: int, stride: Stride, acceleration: Acceleration | None
 ) -> np.ndarray:
-    """Return V_r during each of the `steps` after `done`, (step, start), by Eq. 11; V itself without an acceleration.
+    """Return V_r in each of the `steps` steps after `done` steps, (step, start), by Eq. 11.
 
     Args:
         velocity: final V_r, (start,).
-        done: steps since the acceleration began, (start,), or one number for all.
-        steps: number of steps.
-        stride: with the time step.
-        acceleration: Eq. 11.
+        done: number of steps since the acceleration began, (start,), or one number for all starts.
+        steps: number of steps for which V_r is returned.
+        stride: the stride, which gives the time step.
+        acceleration: acceleration of Eq. 11; without it, V_r has its final value in all steps.
     """
     if acceleration is None:
         return np.broadcast_to(velocity, (steps, len(velocity)))

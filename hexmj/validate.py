@@ -1,4 +1,4 @@
-"""Range checks of arguments; each raises `InputError` with the name and the value of the argument."""
+"""Checks of arguments: each returns the value, or raises `InputError` with the argument's name and value."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -14,7 +14,7 @@ Choice = TypeVar("Choice", bound=str)
 
 
 def number(name: str, value: Any, least: float = -math.inf, most: float = math.inf, above: bool = False) -> float:
-    """Return a number as a float if it lies in [least, most], or in (least, most]."""
+    """Return a number as a float if it lies in [least, most]; with `above`, in (least, most]."""
     if not isinstance(value, Real) or isinstance(value, bool) or not least <= float(value) <= most:
         raise InputError(f"{name} = {short(value)}; expected a number{_range(least, most)}")
     if above and value <= least:
@@ -30,20 +30,20 @@ def whole(name: str, value: Any, least: int, most: float = math.inf) -> int:
 
 
 def choice(name: str, value: Choice, valid: Iterable[str]) -> Choice:
-    """Return a name if it is one of the valid ones."""
+    """Return a name if it is one of the valid names."""
     if not isinstance(value, str) or value not in valid:
         raise InputError(f"{name} = {short(value)}; valid names: {', '.join(valid)}")
     return value
 
 
 def distinct(name: str, values: Sequence[Any]) -> None:
-    """Require at least one value, and every value once."""
+    """Raise InputError unless there is at least one value and no value repeats."""
     if len(values) == 0 or len(set(values)) < len(values):
         raise InputError(f"{name} = {short(list(values))}; expected one or more distinct values")
 
 
 def numbers(name: str, values: ArrayLike) -> np.ndarray:
-    """Return a new array of floats with the memory layout of the values, on which the bits of sums depend."""
+    """Return a new array of floats; it keeps the memory layout of the values, on which the bits of sums depend."""
     try:
         return np.array(values, dtype=float)
     except (ValueError, TypeError):
@@ -51,12 +51,12 @@ def numbers(name: str, values: ArrayLike) -> np.ndarray:
 
 
 def leg_last(values: Any) -> Any:
-    """Move the dimension `leg` of a DataArray to the end; return other values as they are."""
+    """Return a DataArray with its dimension `leg` moved to the end; return other values as they are."""
     return values.transpose(..., "leg") if "leg" in getattr(values, "dims", ()) else values
 
 
 def states(name: str, values: ArrayLike) -> np.ndarray:
-    """Return a new array of booleans, which may be given as 0 and 1."""
+    """Return a new array of booleans from booleans or from the integers 0 and 1."""
     array = np.asarray(values)
     if array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.isin(array, (0, 1)).all()):
         return np.array(array, dtype=bool, order="C")
@@ -64,7 +64,7 @@ def states(name: str, values: ArrayLike) -> np.ndarray:
 
 
 def short(value: Any) -> str:
-    """Return the beginning of a value's repr, on one line."""
+    """Return the first 80 characters of a value's repr, on one line."""
     return f"{' '.join(repr(value).split()):.80}"
 
 

@@ -1,6 +1,6 @@
-"""Variants: one constant or rule that the paper leaves open, changed at a time.
+"""Variants: each changes one constant or rule that the paper leaves open.
 
-A weight set is worth most if its FLSS is low for every variant that the authors may have used.
+The authors may have used any variant, so that the best weight sets have a low FLSS under every one.
 """
 
 from dataclasses import MISSING, fields, is_dataclass, replace
@@ -27,35 +27,35 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "sequential": {"order": "sequential"},
     "lasting": {"ipsilateral": "lasting"},
 }
-"""Name -> changed fields of a `Stride` [mm, time units], a network or its model variant; see `varied`."""
+"""Name -> changed fields of a `Stride` [mm, time units], a network or its model variant; `varied` applies them."""
 
 UNREACHED = {"AEP0 11"}
-"""Variants that are out of reach of the stick insect's legs, left out of all physical walks."""
+"""Variants whose tips the stick insect's legs cannot reach; physical walks leave them out."""
 
 Part = TypeVar("Part")
 
 
 def variants(physical: bool = False) -> list[str]:
-    """Return the names of `VARIANTS`, for physical walks without `UNREACHED`."""
+    """Return the names of `VARIANTS`; with `physical` those without `UNREACHED`, for physical walks."""
     return [name for name in VARIANTS if not (physical and name in UNREACHED)]
 
 
 def varied(part: Part, variant: str) -> Part:
-    """Return a stride, a network or a form of its weights under one of `VARIANTS`.
+    """Return a stride, a network or a searched form of a network with the changes of one of `VARIANTS`.
 
-    Fields that the part does not have are left out; parts of it are varied within. A field that has the changed value
-    already gets its default instead.
+    Changes of fields that neither the part nor its nested dataclasses have are ignored. A field that already has the
+    changed value gets its default value.
 
     Raises:
-        InputError: there is no such variant, or its value does not fit the part's others.
+        InputError: there is no such variant, or its value does not fit the other fields of the part.
     """
     own: Any = part
-    wanted, changes = VARIANTS[choice("variant", variant, VARIANTS)], {}
+    values, changes = VARIANTS[choice("variant", variant, VARIANTS)], {}
     for field in fields(own):
         name, value = field.name, getattr(own, field.name)
-        if name in wanted:
-            usual = field.default if field.default_factory is MISSING else field.default_factory()
-            changes[name] = wanted[name] if value != wanted[name] else usual
+        if name in values:
+            default = field.default if field.default_factory is MISSING else field.default_factory()
+            changes[name] = values[name] if value != values[name] else default
         elif is_dataclass(value) and (inner := varied(value, variant)) is not value:
             changes[name] = inner
     try:

@@ -1,4 +1,4 @@
-"""The type of walk that both measures of stability read, what a plan adds for the body, and footfall diagrams."""
+"""Walks, planned or measured, from which both measures of stability are computed; footfall diagrams."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -15,10 +15,10 @@ from hexmj.validate import whole
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Walk:
-    """Positions of the tips relative to the centre of mass, and which of them stand.
+    """Tips relative to the centre of mass, and the legs in stance, after each step of many starts.
 
-    A planned walk has the paper's centre of mass (fixed at O) and the tips as planned; a measured
-    walk has the body's own centre of mass, the physical tips and the feet that touch the ground.
+    A planned walk has the paper's centre of mass (fixed at O), planned tips and planned stance. A
+    measured walk has the body's own centre of mass, the physical tips and the feet that touch the ground.
     """
 
     time: np.ndarray
@@ -28,11 +28,11 @@ class Walk:
     x: np.ndarray
     """(step, start, leg) tips on their own axes O_i X_i [mm]."""
     y: np.ndarray
-    """(step, start, leg) tips beside the body axis, left positive [mm]."""
+    """(step, start, leg) distance of the tips from the body axis, left positive [mm]."""
     stance: np.ndarray
     """(step, start, leg) True where the leg retracts (planned) or touches the ground (measured)."""
     geometry: Geometry = FIG1
-    """Origins of the legs' axes."""
+    """Origins of the legs' axes, and lines on which the tips move."""
 
     def __post_init__(self) -> None:
         shape = np.shape(self.stance)
@@ -46,7 +46,7 @@ class Walk:
         return f"{type(self).__name__}({extent(self)})"
 
     def _repr_html_(self) -> str | None:
-        """Return the footfall diagram that a notebook shows."""
+        """Return the footfall diagram of start 0, which a notebook shows."""
         if len(self.time) < 2 or not self.stance.shape[1]:
             return None
         known = ~np.isnan(self.x[:, 0])
@@ -54,19 +54,19 @@ class Walk:
 
     @property
     def feet(self) -> np.ndarray:
-        """(step, start, leg, 2) tips from the centre of mass: ahead, to the left [mm]."""
+        """(step, start, leg, 2) tips relative to the centre of mass: ahead, to the left [mm]."""
         return np.stack([self.x + np.array(self.geometry.origin), self.y], axis=-1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlannedWalk(Walk):
-    """A walk as planned, with what a body needs to lift and lower the feet."""
+    """A planned walk, with the AEP and height by which a body lifts and lowers its feet."""
 
     aep: np.ndarray = field(kw_only=True)
-    """(step, start, leg) end of the present swing on the leg's own axis [mm], so that the body can lower the foot in
-    time; where it is NaN the foot is lowered once the leg stands."""
+    """(step, start, leg) tip at the end of the present swing, on the leg's own axis [mm]; from it the body knows when
+    to lower the foot. If it is NaN, the body lowers the foot when stance begins."""
     height: np.ndarray = field(kw_only=True)
-    """(step, start, leg) height of the tip above the ground [mm]; the body lifts and lowers tips with NaN."""
+    """(step, start, leg) height of the tip above the ground [mm]; if NaN, the body itself lifts and lowers the foot."""
 
 
 def extent(walk: Walk) -> str:
@@ -79,13 +79,13 @@ def extent(walk: Walk) -> str:
 
 
 PLANNED = ("x", "y", "stance", "aep", "height")
-"""Names of what a plan gives for every step, start and leg."""
+"""Names of the arrays (step, start, leg) of a `PlannedWalk`."""
 
 AnyWalk = TypeVar("AnyWalk", bound=Walk)
 
 
 def joined(walks: Sequence[AnyWalk]) -> AnyWalk:
-    """Join walks of the same starts that follow each other."""
+    """Return successive parts of a walk of the same starts as one walk."""
     if len(walks) == 1:
         return walks[0]
     return replace(
@@ -104,12 +104,12 @@ def one_start(walk: AnyWalk, start: int) -> AnyWalk:
 
 
 def of_starts(walk: AnyWalk, which: Any) -> AnyWalk:
-    """Return the walks of some starts."""
+    """Return the walk of only the starts that `which` selects."""
     return replace(walk, **{name: getattr(walk, name)[:, which] for name in _arrays(type(walk)) if name != "time"})
 
 
 def part_of(walk: AnyWalk, steps: slice) -> AnyWalk:
-    """Return some steps of a walk."""
+    """Return the part of a walk with only these steps."""
     return replace(walk, **{name: getattr(walk, name)[steps] for name in _arrays(type(walk))})
 
 
@@ -120,27 +120,27 @@ def copied(walk: AnyWalk) -> AnyWalk:
 
 @cache
 def _arrays(kind: type[Walk]) -> list[str]:
-    """Return the names of a walk's arrays."""
+    """Return the names of the fields of a walk that are arrays."""
     return [field.name for field in fields(kind) if field.name != "geometry"]
 
 
 def spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:
-    """Return begin and length of each period in which `on`, (step,), is true; `time` is that of the steps' ends."""
+    """Return begin and duration of each interval in which `on`, (step,), is True; `time` is each step's end."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
     step = time[1] - time[0] if len(time) > 1 else 0.0
     return [(float(time[a] - step), float((b - a) * step)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def footfall_html(line: str, time: np.ndarray, swings: np.ndarray, note: str) -> str:
-    """Return a line of text and a footfall diagram below it, for notebooks: a bar for each swing.
+    """Return HTML for notebooks: a line of text, and a footfall diagram with a bar for each swing.
 
     Args:
-        line: the text.
-        time: at the end of each step, (step,), at least two [time units].
-        swings: which feet are off the ground, (step, leg).
-        note: text below the bars, beside the time.
+        line: text above the diagram.
+        time: time at the end of each step, (step,), at least two steps [time units].
+        swings: True for feet that are off the ground, (step, leg).
+        note: text below the bars, after the time.
     """
-    width, row, left = 640, 14, 28  # of the bars, of a leg, and of the names of legs [pixels]
+    width, row, left = 640, 14, 28  # width of the bars, height of a leg's row, width of leg names [pixels]
     step = time[1] - time[0]
     begin, scale = time[0] - step, width / (time[-1] - time[0] + step)
     bars = [
