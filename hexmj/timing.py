@@ -39,11 +39,11 @@ class Stride:
     pep0: float = -10.0
     """Posterior extreme position without influences [mm]."""
     pep_min: float = -20.0
-    """Rearmost posterior extreme position [mm]."""
+    """Rearmost posterior extreme position that influences can set [mm]."""
     dt: float = 0.1
     """Time step of a plan, dt in Eq. 6 [time units; a protracting tip moves 1 mm per time unit]."""
     geometry: Geometry = field(default=FIG1)
-    """Lines of the tips: fig1 (`FIG1`) as in Fig. 1, or centred (`CENTRED`) with the centre of mass above O_2."""
+    """Lines of the tips: fig1, as in Fig. 1 of the paper, or centred, with the centre of mass above O_2."""
 
     def __post_init__(self) -> None:
         for name in ("aep0", "pep0", "pep_min"):
