@@ -149,7 +149,7 @@ def test_a_load_without_trials_refuses_no_league() -> None:
         ("velocity", Terrain, {"velocities": (0.0,)}),
         ("over", StabilityMap, {"over": "wind"}),
         ("friction", StabilityMap, {"over": "friction", "values": [-1.0]}),
-        ("reads the legs", StabilityMap, {"controller": hexmj.SensoryFeedback(hexmj.LDVS)}),
+        ("sensory feedback", StabilityMap, {"controller": hexmj.SensoryFeedback(hexmj.LDVS)}),
         ("leg_masses", StaticLimit, {"leg_masses": ()}),
         ("vp", StaticLimit, {"conditions": hexmj.Conditions(vp=20.0)}),
         ("disturbances", DisturbedWalks, {"disturbances": ["halt", "halt"]}),

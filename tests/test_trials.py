@@ -14,7 +14,7 @@ from hexmj.controllers.wrappers import RISE, LegLost, PoorSenses
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
-from hexmj.studies.league import DISTURBED, GROUNDS, League, crossed
+from hexmj.studies.league import DISTURBED, GROUNDS, League, distance_to_cross
 from hexmj.studies.standings import TRIALS
 from hexmj.timing import Stride
 
@@ -24,7 +24,7 @@ LARGER = replace(STICK_INSECT, lengths=STICK_INSECT.lengths.scaled(1.5), standin
 
 def test_trials_are_what_they_say() -> None:
     league, walked = League(ONE), [name for name in TRIALS if name not in DISTURBED]
-    found = {name: trial for name in walked if (trial := league.walking(name, ONE["ldvs"]))}
+    found = {name: trial for name in walked if (trial := league.trial_settings(name, ONE["ldvs"]))}
     assert list(found) == walked
     assert found["load"]["conditions"].load == 1.0
     assert found["step"]["conditions"].ground_height == 3.0
@@ -36,10 +36,10 @@ def test_grounds_lie_as_the_body_is_large() -> None:
     for body, sizes in ((STICK_INSECT, (3.0, 45.0, 75.0)), (LARGER, (4.5, 67.5, 112.5))):
         usual = Conditions(body=body)
         for name in GROUNDS:
-            trial = League(ONE, conditions=usual).walking(name, ONE["ldvs"])
+            trial = League(ONE, conditions=usual).trial_settings(name, ONE["ldvs"])
             assert trial and trial["conditions"].ground == name
             ground = trial["conditions"]
-            assert (ground.ground_height, ground.ground_at, crossed(usual)) == pytest.approx(sizes, rel=1e-12)
+            assert (ground.ground_height, ground.ground_at, distance_to_cross(usual)) == pytest.approx(sizes, rel=1e-12)
 
 
 def test_grounds_that_no_leg_of_a_larger_body_gets_to_are_no_trials() -> None:
@@ -70,7 +70,7 @@ def test_a_lost_leg_is_held_above_the_standing_height_however_short_the_steps() 
     short = Stride(aep0=2.0, pep0=-2.0, pep_min=-4.0)
     tall = Conditions(standing_height=14.0)
     for conditions, stride in ((Conditions(), short), (Conditions(body=LARGER), Stride()), (tall, Stride())):
-        trial = League(ONE, conditions=conditions, stride=stride).walking("lost 1", ONE["ldvs"])
+        trial = League(ONE, conditions=conditions, stride=stride).trial_settings("lost 1", ONE["ldvs"])
         assert trial is not None
         plan = trial["controller"].begin(hexmj.draw_starts(2, 1, stride), np.full(2, 0.3), stride)
         high.append(np.nanmax(plan.advance(300).height[..., 0]))
@@ -108,4 +108,4 @@ def test_a_delay_that_is_no_step_is_refused_and_no_trial() -> None:
     with pytest.raises(InputError):
         late.begin(hexmj.draw_starts(1, 0), np.array([0.5]), Stride())
     slow = League(ONE, conditions=Conditions(vp=2.0))
-    assert slow.walking("late", ONE["ldvs"]) is None and slow.walking("noise", ONE["ldvs"])
+    assert slow.trial_settings("late", ONE["ldvs"]) is None and slow.trial_settings("noise", ONE["ldvs"])

@@ -1,4 +1,4 @@
-"""Controllers without one mechanism or rule, or with one more, beside the whole, on the same starts."""
+"""Ablation: a whole controller against the same without one mechanism or rule, or with one more, on the same starts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from hexmj.errors import InputError
 from hexmj.measures.figures import caption
 from hexmj.measures.tables import differences, frequencies, over_cells, velocity_axis
 from hexmj.plotting import FEWER, NOTHING, head, heat_map, in_figure, picture, velocity_columns
-from hexmj.studies.league import REGIMES
+from hexmj.studies.league import MOST_GAIT_STARTS
 from hexmj.studies.league_cells import ControllerStudy, EntrantWalks, short_names
 from hexmj.sweep import Cell
 from hexmj.timing import observation_duration
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SWITCHES = (*(f"without-{part}" for part in (1, 2, 3, 4, 5)), "with-2", "with-4")
-"""Changes of a controller, as `load_controller` names them."""
+"""Suffixes by which `load_controller` leaves a mechanism or rule of a controller out, or adds one."""
 
 MEASURES = {
     "start": "kinematic loss within two protractions",
@@ -33,17 +33,17 @@ MEASURES = {
     "limit": "no statically stable steady-state gait",
     "physical": "fall within three periods",
 }
-"""Measure -> the event that is counted."""
+"""Measure -> event whose frequency it is."""
 
 NOTES = f"* 95 % interval excludes 0; {NOTHING} no walk is left; {FEWER} walks diverged or were out of reach"
-"""Explanation of the marks."""
+"""Explanation of the marks in the cells of the figure."""
 
 
 def wholes(names: Sequence[str]) -> dict[str, Controller]:
-    """Return the controllers `switched` of each whole, by short names.
+    """Return the named controllers, and each with one part left out or added, by short names; see `switched`.
 
     Raises:
-        InputError: two of them have the same name, or one has nothing to switch.
+        InputError: two controllers have the same name, or a controller has no mechanisms or rules.
     """
     short = short_names({name: load_controller(name) for name in names})
     several = [switched(name, short[name]) for name in names]
@@ -52,12 +52,12 @@ def wholes(names: Sequence[str]) -> dict[str, Controller]:
 
 
 def switched(name: str, shown: str = "") -> dict[str, Controller]:
-    """Return the whole controller and its changes by the `SWITCHES` that make a difference.
+    """Return the whole controller, and the controller changed by each of the `SWITCHES` that apply to it.
 
-    They are named by `shown`, by default the same as `name`.
+    Names in the result begin with `shown`, by default `name`.
 
     Raises:
-        InputError: there is no such controller, or it has nothing to switch.
+        InputError: there is no such controller, or it has no mechanisms or rules.
     """
     shown = shown or name
     found = {shown: load_controller(name)}
@@ -66,29 +66,29 @@ def switched(name: str, shown: str = "") -> dict[str, Controller]:
             found[f"{shown}-{switch}"] = load_controller(f"{name}-{switch}")
         except InputError as error:
             if error.__cause__:
-                raise  # an error of the user's code
+                raise  # the user's own code raised an error
     if len(found) == 1:
-        raise InputError(f"controller = {name} has no mechanisms or rules to switch; expected a network or Walknet")
+        raise InputError(f"controller = {name}; expected a network or Walknet, whose parts can be switched")
     return found
 
 
 @dataclass(frozen=True)
 class Ablation(ControllerStudy):
-    """The same starts for every controller: all of them in kinematic walks, the first of them in physics.
+    """All starts of every controller in kinematic walks, and the first `physical_starts` of them in physical walks.
 
-    A controller with a name such as ldvs-without-3 is compared with its whole, here ldvs, if that takes part.
+    A controller with a name such as ldvs-without-3 is compared with its whole, here ldvs, if the whole takes part.
     """
 
     @property
     def wholes(self) -> list[str]:
-        """The name of the whole of each controller."""
+        """For each controller, the name of the whole that it is compared with; a whole is compared with itself."""
         names = [(name, VARIED.fullmatch(name)) for name in self.controllers]
         return [part["name"] if part and part["name"] in self.controllers else name for name, part in names]
 
     def cells(self) -> list[Cell]:
         """Return a cell for each controller, measure and velocity."""
         self.check_walks(self.velocities, self.conditions)
-        few = {"limit": min(self.n_starts, REGIMES), "physical": min(self.physical_starts, self.n_starts)}
+        few = {"limit": min(self.n_starts, MOST_GAIT_STARTS), "physical": min(self.physical_starts, self.n_starts)}
         cells = []
         velocities: list[float] = self.observed[0].tolist()
         for (name, controller), measure, v in product(self.controllers.items(), MEASURES, velocities):
@@ -105,18 +105,18 @@ class Ablation(ControllerStudy):
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return how often events happen, with and without parts.
+        """Return the frequencies of the events, for wholes and for changed controllers.
 
         Returns:
-            Over (controller, measure, velocity): `frequency` with its 95 % Wilson interval, of `frequency_starts`, and
-            `more`, how far it is above that of the `whole` on the same starts, with its interval.
+            Over (controller, measure, velocity): `frequency` with its 95 % Wilson interval, over `frequency_starts`
+            starts; and `more`, `frequency` minus that of the `whole` on the same starts, with its 95 % interval.
         """
         import xarray as xr
 
         names, dims = list(self.controllers), ("controller", "measure", "velocity")
         sizes = dict(zip(dims, (len(names), len(MEASURES), len(self.velocities)), strict=True))
         found = over_cells(sizes, data)
-        lost = found.lost.fillna(found.fell)  # a cell has either of them, or `stable`
+        lost = found.lost.fillna(found.fell)  # each cell has exactly one of lost, fell, stable
         events = lost.fillna(1.0 - found.stable).values
         wholes = events[[names.index(whole) for whole in self.wholes]]
         table = frequencies("frequency", events, dims) | differences("more", events, wholes, dims)
@@ -127,7 +127,7 @@ class Ablation(ControllerStudy):
 
 
 def ablation_figure(result: "xr.Dataset") -> "Figure":
-    """Draw frequencies of the wholes, and below each how much more often events happen without a part."""
+    """Draw a row with the frequencies of each whole, and below it rows with the differences of changed controllers."""
     rows, columns = result.sizes["controller"], result.sizes["velocity"]
     figure = picture(2.6 + 0.58 * len(MEASURES) * max(4, columns), 1.9 + 0.27 * rows)
     panels = figure.subplots(1, len(MEASURES), sharey=True)
@@ -143,14 +143,14 @@ def ablation_figure(result: "xr.Dataset") -> "Figure":
             panel.axhline(row + 0.5, color="0.3", linewidth=0.8)
     panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values])
     heading = "What a part buys: frequencies of the whole, and differences without it"
-    physical, gaits = result.attrs["physical_starts"], min(result.attrs["starts"], REGIMES)
+    physical, gaits = result.attrs["physical_starts"], min(result.attrs["starts"], MOST_GAIT_STARTS)
     head(figure, heading, f"{caption(result)}; {physical} of them in physics, {gaits} for the gait")
     figure.supxlabel(NOTES, fontsize=8)
     return figure
 
 
 def cell_text(cell: "xr.Dataset") -> str:
-    """Return the text of one controller, measure and velocity."""
+    """Return the text in the figure for one controller, measure and velocity: a frequency or difference, and marks."""
     whole = cell.controller.item() == cell.whole.item()
     value = (cell.frequency if whole else cell.more).item()
     if np.isnan(value):

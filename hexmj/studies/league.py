@@ -1,4 +1,4 @@
-"""The league: every entrant in kinematic walks, in physics, and in every trial, with a cell for each."""
+"""The league: all entrants (controllers) in kinematic walks, physical walks and trials, with a cell for each."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,48 +23,48 @@ if TYPE_CHECKING:
     import xarray as xr
 
 RANGE = (0.1, 0.5)
-"""Velocities of J_N (Eq. 10)."""
+"""Range of velocities V_r over which J_N of Eq. 10 is measured."""
 
 FINAL = 0.9
-"""Velocity to which walks accelerate (Eq. 11)."""
+"""Velocity V_r to which kinematic walks accelerate by Eq. 11."""
 
-KINEMATIC = 0.05
-"""Cost of a time unit of a kinematic walk, relative to a physical one."""
+KINEMATIC_COST = 0.05
+"""Computing time of a time unit of a kinematic walk, as a fraction of that of a physical walk."""
 
-REGIMES = 50
-"""Most starts whose steady-state gait is measured."""
+MOST_GAIT_STARTS = 50
+"""Maximum number of starts whose steady-state gait is measured."""
 
 DELAY, NOISE = 0.02, 0.1
-"""Delay of the sensed legs [s], and standard deviation of the error of sensed tips, as a part of AEP_0 - PEP_0."""
+"""Delay of the sensed legs [s], and standard deviation of the sensed tips' errors as a fraction of AEP_0 - PEP_0."""
 
 DISTURBED = {"halt": Case("halt", "none"), "leg": Case("leg", "none"), "push": Case("push", "none", impulse=40.0)}
-"""Disturbances of walks whose plan is stable until then, each at a time of its own."""
+"""Trial with a disturbance -> its case; the plans of these walks are stable until the disturbance."""
 
 GROUNDS = ("step", "rough")
-"""Obstacles, as near as the body allows: even slow walks reach them with all legs."""
+"""Trials on uneven ground, which begins as near as the body allows, so that all legs of slow walks reach it too."""
 
 HEIGHT, LOAD = 0.3, 1.0
-"""Height of the obstacles, in standing heights of the body, and load of the trial, in weights of the body."""
+"""Height of step and bumps, in standing heights of the body; added weight in the trial 'load', in body weights."""
 
 HELD = 1.2
-"""Height at which a lost leg is held, in standing heights of the body or of the walk, whichever is higher."""
+"""Height at which a lost leg is held, in multiples of the standing height of the body or of the walk (the higher)."""
 
 
 @dataclass(frozen=True)
 class League(ControllerStudy):
-    """The same starts for every entrant: all of them in kinematic walks, the first of them in physics and in trials.
+    """All starts of every entrant in kinematic walks, and the first of these starts in physical walks and in trials.
 
-    An entrant whose name ends with '-ideal' begins at its ideal start, see `league_cells.is_ideal`.
+    An entrant with a name that ends with '-ideal' walks from its ideal start only, see `league_cells.is_ideal`.
     """
 
     velocities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
     physical_starts: int = 200
     trial_starts: int = 50
-    """Number of the starts in each trial; at most all."""
+    """Number of starts in each trial, the first ones of all starts."""
     trial_velocity: float = 0.3
     """Velocity V_r of the trials."""
     accelerating: bool = True
-    """Whether kinematic walks accelerate to V_r = 0.9 too, which takes half of the time of all kinematic walks."""
+    """Whether to add kinematic walks that accelerate to V_r = 0.9; they take half of the kinematic computing time."""
     observation_time: str | float = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
 
@@ -74,14 +74,14 @@ class League(ControllerStudy):
         super().__post_init__()
         whole("trial_starts", self.trial_starts, 1)
         if not 0 < self.trial_velocity < 1:
-            raise InputError(f"trial_velocity = {self.trial_velocity}; expected above 0 and below 1")
+            raise InputError(f"trial_velocity = {self.trial_velocity}; expected 0 < V < 1")
 
     def named_cells(self) -> dict[tuple[str, str], Cell]:
-        """Return every cell by its entrant and its question."""
-        return {(name, asked): cell for name in self.controllers for asked, cell in self._asked(name)}
+        """Return every cell by its entrant and its question, for example ('ldvs', 'kinematic 0.3')."""
+        return {(name, question): cell for name in self.controllers for question, cell in self._questions(name)}
 
     def cells(self) -> list[Cell]:
-        """Return every cell."""
+        """Return the cells of all entrants; raise InputError if an entrant refuses a velocity."""
         from hexmj.physics.settle import check_adhesion
 
         random = [name for name, controller in self.controllers.items() if not is_ideal(name, controller)]
@@ -93,14 +93,14 @@ class League(ControllerStudy):
         return [*self.named_cells().values()]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return what tables, figures and ranks are made of, see `standings.standings`."""
+        """Return the dataset from which tables, figures and ranks are made, see `standings.standings`."""
         own = {name: getattr(self, name) for name in ("velocities", "trial_velocity", "accelerating", "periods")}
         own |= {name: min(getattr(self, name), self.n_starts) for name in ("physical_starts", "trial_starts")}
         found = dict(zip(self.named_cells(), data, strict=True))
         return self.labelled(standings(self.controllers, self.observed[0], found), "league", **own)
 
-    def _asked(self, name: str) -> Iterator[tuple[str, Cell]]:
-        """Yield the cells of an entrant by question; gaits and trials need random starts."""
+    def _questions(self, name: str) -> Iterator[tuple[str, Cell]]:
+        """Yield questions and cells of an entrant; an entrant with an ideal start has no cells for gaits and trials."""
         from hexmj.physics.pushes import can_push
 
         controller, every = self.controllers[name], self.n_starts
@@ -112,45 +112,45 @@ class League(ControllerStudy):
 
         def cell(question: str, cost: float, method: str, changed: Mapping[str, Any], **own: Any) -> tuple[str, Cell]:
             own_walks = replace(walks, **changed)
-            work = float(cost * own_walks.n_starts)
+            work = float(cost * own_walks.n_starts)  # estimated computing time, relative to other cells
             return question, Cell(f"{name} {question}", getattr(own_walks, method), own, work)
 
         for v, time in zip(*(axis.tolist() for axis in self.observed), strict=True):
             at = {"velocity": v, "duration": time}
-            yield cell(f"kinematic {v}", time * KINEMATIC, "losses", at)
+            yield cell(f"kinematic {v}", time * KINEMATIC_COST, "losses", at)
             yield cell(f"physics {v}", time, "outcomes", at | physics)
             if not ideal:
-                few = at | {"n_starts": min(every, REGIMES)}
-                yield cell(f"gait {v}", 20 * time * KINEMATIC, "gaits", few, periods=self.periods)
+                few = at | {"n_starts": min(every, MOST_GAIT_STARTS)}
+                yield cell(f"gait {v}", 20 * time * KINEMATIC_COST, "gaits", few, periods=self.periods)
         if ideal:
             return
         low, high = RANGE
         own = {"low": low, "high": high, "observation_time": self.observation_time}
-        yield cell("range", 600 * KINEMATIC, "losses_over_range", {"velocity": low}, **own)
+        yield cell("range", 600 * KINEMATIC_COST, "losses_over_range", {"velocity": low}, **own)
         if self.accelerating:
             eq11 = Acceleration()
             time = self._time(FINAL) + eq11.duration(FINAL)
             speeding = {"velocity": FINAL, "duration": time, "acceleration": eq11}
-            yield cell("accelerated", 10_000 * KINEMATIC, "losses", speeding)
+            yield cell("accelerated", 10_000 * KINEMATIC_COST, "losses", speeding)
         for trial, leg in LEGS_LOST.items():
-            yield cell(f"kinematic, {trial}", 200 * KINEMATIC, "losses", {"controller": LegLost(controller, leg)})
+            yield cell(f"kinematic, {trial}", 200 * KINEMATIC_COST, "losses", {"controller": LegLost(controller, leg)})
         pushes = can_push(self.conditions, self.stride, tried)
-        reaches = self.trial_velocity * tried >= crossed(self.conditions)
+        reaches = self.trial_velocity * tried >= distance_to_cross(self.conditions)
         for trial in TRIALS:
             if case := DISTURBED.get(trial):
                 if isinstance(controller, SteerableController) and (pushes or trial != "push"):
                     yield cell(trial, 300, "disturbed", trials, case=case)
-            elif (reaches or trial not in GROUNDS) and (changed := self.walking(trial, controller)):
+            elif (reaches or trial not in GROUNDS) and (changed := self.trial_settings(trial, controller)):
                 yield cell(trial, 180, "outcomes", trials | changed)
 
     def _time(self, velocity: float) -> float:
-        """Return the observation time at a velocity [time units]."""
+        """Return the observation time at a velocity V_r [time units]."""
         return float(observation_duration(self.observation_time, velocity, self.stride))
 
-    def walking(self, trial: str, controller: Controller) -> dict[str, Any] | None:
-        """Return the controller and the conditions of a trial that is no disturbance.
+    def trial_settings(self, trial: str, controller: Controller) -> dict[str, Any] | None:
+        """Return the controller and the conditions of a trial without a disturbance.
 
-        None if the entrant has no sensory feedback, or its steps are longer than the delay.
+        Return None if the entrant cannot use the sensory feedback of the trial, or the delay rounds to no time step.
         """
         conditions, body = self.conditions, self.conditions.body
         if trial in GROUNDS:
@@ -174,6 +174,6 @@ class League(ControllerStudy):
         return {"controller": controller, "conditions": conditions}
 
 
-def crossed(conditions: Conditions) -> float:
-    """Return the way after which all legs have reached the obstacle of a trial [mm]."""
+def distance_to_cross(conditions: Conditions) -> float:
+    """Return the distance after which all legs have reached a trial's obstacle [mm]: 5/3 of the distance to it."""
     return conditions.body.lengths.nearest_obstacle * 5.0 / 3.0
