@@ -1,7 +1,7 @@
 """Steady-state gaits (paper, Section 5.3): their period, duty factors and relative phases.
 
-A leg's movement is timed by its onsets, when it is raised and protraction begins. The paper prints no event and no
-threshold: the onset, `TOLERANCE` and `CYCLES` are our conventions.
+A leg's cycle begins at its onset, when the leg is raised and protraction begins. The paper does not define how a gait
+is detected: the onset, `TOLERANCE`, `STEPS` and `CYCLES` are our conventions.
 """
 
 from collections.abc import Callable
@@ -20,40 +20,40 @@ from hexmj.validate import number, whole
 from hexmj.walks import Walk, footfall_html, part_of
 
 TOLERANCE = 0.002
-"""Greatest change of a leg's cycle or lag within a steady-state gait, as a fraction of the period ..."""
+"""Maximum change of a leg's cycle or lag within a steady-state gait, as a fraction of the period; `STEPS` add to it."""
 
 STEPS = 5
-"""... plus this number of time steps, since states change only at whole steps and controllers pass on the jitter."""
+"""Number of time steps added to the tolerance of cycles and lags, since legs change state at whole steps only."""
 
 CYCLES = 10
-"""Fewest whole cycles of every leg that show a steady-state gait; some settle so slowly that three are alike early."""
+"""Minimum number of equal cycles of every leg in a steady-state gait; three may be equal before a gait has settled."""
 
 FINE = Stride(dt=0.01)
-"""The stride with the time step of Figs. 5 and 6."""
+"""Default stride of gaits, with the time step of Figs. 5 and 6."""
 
 PART = 4096
-"""Steps of a walk held in memory at a time."""
+"""Maximum number of steps of a walk that are held in memory at a time."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Gait:
-    """The steady-state gait of each start; NaN where none was reached, for example where a leg never swings."""
+    """Steady-state gaits; a start that reaches none, for example because a leg never swings, has NaN."""
 
     period: np.ndarray
-    """(start,) mean over the legs [time units]."""
+    """(start,) mean period of the legs [time units]."""
     periods: np.ndarray
-    """(start, leg) each leg's own [time units]."""
+    """(start, leg) period of each leg [time units]."""
     duty_factor: np.ndarray
-    """(start, leg) fraction of its period for which a leg stands, over cycles whose swings last as long as the last."""
+    """(start, leg) fraction of its period for which a leg stands, over cycles with a swing as long as the last one."""
     phase: np.ndarray
-    """(start, pair) Phi_{j-k} in [0, 1), in the order of `PAIRS`."""
+    """(start, pair) relative phase Phi_{j-k} in [0, 1), pairs in the order of `PAIRS`."""
     reached: np.ndarray
-    """(start,) onset of leg 1 at which the steady-state gait begins [time units]; inf where there is none."""
+    """(start,) onset of leg 1 at which the steady-state gait begins [time units]; inf without a steady-state gait."""
     periodic: np.ndarray
-    """(start,) whether all legs keep one period and their lags to the end of the walk, for `CYCLES` or more."""
+    """(start,) whether period and lags of all legs are constant until the walk ends, for at least `CYCLES` cycles."""
     stable: np.ndarray
-    """(start,) whether static stability is kept in the last period of the walk; where the gait is not periodic, in the
-    last `CYCLES` times the longest of the legs' last cycles, or throughout the known steps if a leg has no cycle."""
+    """(start,) whether the walk keeps static stability at its end: in the last period if the gait is periodic, else for
+    `CYCLES` times the longest of the legs' last cycles, or during all known steps if a leg has no whole cycle."""
 
     def __repr__(self) -> str:
         known, line = self.periodic, f"Gait(of {len(self.periodic)}: periodic {int(self.periodic.sum())}"
@@ -64,7 +64,7 @@ class Gait:
         return f"{line})"
 
     def _repr_html_(self) -> str | None:
-        """Return the footfall diagram that a notebook shows: two periods of the first periodic gait."""
+        """Return a footfall diagram for notebooks, as HTML: two periods of the first periodic gait."""
         if not self.periodic.any():
             return None
         start = int(np.argmax(self.periodic))
@@ -76,17 +76,17 @@ class Gait:
 
 
 def gait(walk: Walk) -> Gait:
-    """Return the gait of every start of a walk that ends with a constant velocity.
+    """Return the gait of every start of a walk whose velocity is constant at its end.
 
-    A leg that is raised in the first step has no onset there, since its state before is not known.
+    A leg that is raised in the first step has no onset in that step, since the state before it is unknown.
 
     Raises:
         InputError: the walk has fewer than two steps, or no starts.
     """
     if len(walk.time) < 2:
-        raise InputError(f"a walk of {len(walk.time)} steps; expected at least 2, and {CYCLES} periods to find a gait")
+        raise InputError(f"a walk of {len(walk.time)} steps; expected at least {CYCLES} periods of every leg")
     if not walk.stance.shape[1]:
-        raise InputError("a walk of 0 starts; expected at least 1")
+        raise InputError("the walk has 0 starts; expected at least 1")
 
     def upright(steps: int) -> np.ndarray:
         return walk_margin(part_of(walk, slice(-steps, None))) > 0
@@ -107,17 +107,17 @@ def steady_state_gait(
 ) -> Gait:
     """Return the gaits that a controller reaches from random starts, as in Figs. 5 and 6.
 
-    Only the changes of state and the stability of the last periods of a walk are kept in memory.
+    Only the legs' changes of state and the stability of the last periods of a walk are kept in memory.
 
     Args:
-        controller: plans the walks.
+        controller: controller that plans the walks.
         velocity: V_r, or its final value when accelerating, 0 < V < 1.
-        n_starts: N.
-        seed: of the starts.
+        n_starts: number of random starts.
+        seed: seed of the random starts.
         stride: step range, lines of the tips and time step.
-        acceleration: the accelerating procedure of Eq. 11.
-        periods: cycles of every leg after the velocity is reached; slow walks of LDVS need the default.
-        threads: by default one per core; the result does not depend on it.
+        acceleration: the accelerating procedure of Eq. 11; None keeps the velocity constant.
+        periods: number of cycles of every leg after the velocity is reached; slow walks of LDVS need the default.
+        threads: number of threads, by default one per core; the result does not depend on it.
     """
     if not 0 < number("velocity", velocity) < 1:
         raise InputError(f"velocity = {velocity}; expected 0 < V < 1")
@@ -143,7 +143,7 @@ def steady_state_gait(
 
 
 def _changes(stance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the changes of state in (step, start, leg): row after the change, foot = 6 start + leg, and new state."""
+    """Return all changes of `stance`, (step, start, leg), as arrays: row after it, 6 start + leg, and new state."""
     state = stance.reshape(len(stance), -1)
     row, foot = np.divmod(np.flatnonzero(state[1:] != state[:-1]), state.shape[1])
     return row + 1, foot, state[row + 1, foot]
@@ -160,54 +160,54 @@ def _gaits(
     """Return the gaits of all starts.
 
     Args:
-        row, foot, down: changes of state, see `_changes`.
-        time: of the walk, (step,) [time units].
+        row, foot, down: changes between swing and stance, as `_changes` returns them.
+        time: times of all steps of the walk, (step,) [time units].
         n_starts: number of starts.
-        upright: returns whether so many of the last steps are statically stable, or more of them, (step, start).
+        upright: returns whether the walk is stable in the last n or more steps, (step, start), for a number n.
     """
     dt = float((time[-1] - time[0]) / (len(time) - 1))
     raised = _by_foot(row[~down], foot[~down], 6 * n_starts)
     lowered = _by_foot(row[down], foot[down], 6 * n_starts)
     periods, duty_factor = np.full((n_starts, 6), np.nan), np.full((n_starts, 6), np.nan)
     phase, reached = np.full((n_starts, len(PAIRS)), np.nan), np.full(n_starts, np.inf)
-    looked_at = np.full(n_starts, np.inf)  # time at the end of the walk in which stability is evaluated
+    judged = np.full(n_starts, np.inf)  # duration at the end of the walk for which stability is evaluated
     j, k = np.transpose(list(PAIRS.values()))
     for n in range(n_starts):
         legs = slice(6 * n, 6 * n + 6)
         begin, touch, end = time[_cycles(raised[legs], lowered[legs])]
         if len(begin):
-            looked_at[n] = CYCLES * (end - begin)[-1].max()
+            judged[n] = CYCLES * (end - begin)[-1].max()
         settled = _settled(begin, end, dt)
         if len(begin) - settled < CYCLES:
             continue
         due = time[[rows[-1] for rows in raised[legs]]] + (1.0 + TOLERANCE) * (end[-1, 0] - end[-2, 0]) + STEPS * dt
         if (due < time[-1]).any():
-            continue  # a leg is not raised again
+            continue  # a leg has stopped swinging
         begin, touch, end = begin[settled:], touch[settled:], end[settled:]
         span = end[-1] - begin[0]
-        periods[n] = span / np.round(span / (end[-1] - begin[-1]))  # legs raised with leg 1 may skip or repeat a cycle
+        periods[n] = span / np.round(span / (end[-1] - begin[-1]))  # a leg raised together with leg 1 may skip a cycle
         swing = touch - begin
         settled = _like_the_last(np.abs(swing - swing[-1]) / periods[n], dt / periods[n].mean())
         duty_factor[n] = 1.0 - swing[settled:].mean(axis=0) / periods[n]
         phase[n] = circular_mean((begin[:, k] - begin[:, j]) / periods[n].mean(), axis=0)  # Phi_{j-k}
         reached[n] = begin[0, 0]
-        looked_at[n] = periods[n].mean()
-    steps = np.ceil(np.clip(looked_at / dt, 1, len(time))).astype(int)
+        judged[n] = periods[n].mean()
+    steps = np.ceil(np.clip(judged / dt, 1, len(time))).astype(int)
     kept = upright(int(steps.max()))
     stable = np.array([bool(kept[-last:, start].all()) for start, last in enumerate(steps)])
     return Gait(periods.mean(axis=1), periods, duty_factor, phase, reached, np.isfinite(reached), stable)
 
 
 def _by_foot(row: np.ndarray, foot: np.ndarray, feet: int) -> list[np.ndarray]:
-    """Return the rows of each foot, in order."""
+    """Group rows, (change,), by their foot, (change,); return an array for each of the `feet` feet."""
     order = np.argsort(foot, kind="stable")
     return np.split(row[order], np.searchsorted(foot[order], np.arange(1, feet)))
 
 
 def _cycles(raised: list[np.ndarray], lowered: list[np.ndarray]) -> np.ndarray:
-    """Return the rows of onset, touchdown and next onset of every leg, (3, cycle, leg).
+    """Return the rows of onset, touchdown and next onset of every cycle and leg, (3, cycle, leg).
 
-    Cycle n of a leg is the first that begins together with or after cycle n of leg 1.
+    Cycle n of a leg is its first cycle that begins together with or after cycle n of leg 1.
     """
     following = [np.searchsorted(r, raised[0]) for r in raised]
     whole = min(np.count_nonzero(i + 1 < len(r)) for i, r in zip(following, raised, strict=True))
@@ -218,7 +218,7 @@ def _cycles(raised: list[np.ndarray], lowered: list[np.ndarray]) -> np.ndarray:
 
 
 def _settled(begin: np.ndarray, end: np.ndarray, resolution: float) -> int:
-    """Return the first of the cycles, (cycle, leg) [time units], from which periods and lags equal the last ones."""
+    """Return the first cycle from which periods and lags equal the last ones; `begin` and `end` are (cycle, leg)."""
     if len(begin) == 0:
         return 0
     length, lag = end - begin, begin - begin[:, :1]
@@ -229,7 +229,8 @@ def _settled(begin: np.ndarray, end: np.ndarray, resolution: float) -> int:
 
 
 def _like_the_last(change: np.ndarray, resolution: float) -> int:
-    """Return the first cycle from which all equal the last, by their differences from it, (cycle, leg), and the time
-    step, both in periods."""
+    """Return the first cycle from which all cycles equal the last one within the tolerance.
+
+    `change` is each cycle's difference from the last, (cycle, leg), and `resolution` the time step, both in periods."""
     unlike = np.flatnonzero(change.max(axis=1) > TOLERANCE + STEPS * resolution)
     return int(unlike[-1]) + 1 if len(unlike) else 0

@@ -1,4 +1,4 @@
-"""Figures: those that belong to results, and what they share. Figures are made without pyplot."""
+"""Figures of results, and the styles and axes that they share. Figures are made without pyplot."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -30,16 +30,16 @@ FIGURES: dict[str, dict[str, str]] = {
     "search": {"convergence": "search.results:convergence_figure"},
     "recording": {"walk": "replay.take:walk_figure"},
 }
-"""Attribute `study` of a result -> its figures by name, each a module and a function of it."""
+"""Attribute `study` of a result -> its figures: name -> 'module:function' that draws it, modules relative to hexmj."""
 
 CURVE: dict[str, Any] = {"marker": "o", "markersize": 4, "linewidth": 1.6, "capsize": 2.5}
-"""Style of points with intervals."""
+"""Style of points with error bars."""
 
 BESIDE = 0.024
-"""Width in V_r / V_p over which the points of one velocity stand beside each other."""
+"""Width in V_r / V_p over which points of the same velocity are spread, so that they do not overlap."""
 
 MOST_TICKS = 9
-"""Most velocities that are written at an axis; for more, matplotlib chooses round numbers."""
+"""Maximum number of velocities that each get a tick at an axis; if there are more, matplotlib chooses the ticks."""
 
 MEASURE_STYLES: dict[str, dict[str, Any]] = {
     "kinematic": {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
@@ -47,7 +47,7 @@ MEASURE_STYLES: dict[str, dict[str, Any]] = {
     "physical": {"color": "#b3261e", "marker": "^", "linestyle": "-."},
     "toppled": {"color": "#6a4c93", "marker": "x", "linestyle": ":"},
 }
-"""Styles of the measures, which differ without colours too."""
+"""Measure -> style of its curve; markers and lines differ too, for readers without colours."""
 
 SERIES: tuple[dict[str, Any], ...] = (
     {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
@@ -56,31 +56,31 @@ SERIES: tuple[dict[str, Any], ...] = (
     {"color": "#b3261e", "marker": "D", "linestyle": ":"},
     {"color": "#6a4c93", "marker": "v", "linestyle": (0, (5, 1))},
 )
-"""Styles of other curves in turn."""
+"""Styles of curves that show no measure, used in this order."""
 
 VELOCITY = "velocity $V_r / V_p$"
-"""Label of an axis of velocities."""
+"""Label of a velocity axis."""
 
 FEWER, NOTHING = "\N{BULLET}", "\N{EN DASH}"
-"""Marks of a cell of a heat map with missing walks, and of one without a number."""
+"""Marks in a heat map: `FEWER` in a cell with missing walks, `NOTHING` in a cell without a value."""
 
 LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9}
-"""Options of a legend."""
+"""Default options of legends."""
 
 
 def plot(result: "xr.Dataset", which: str | None = None) -> "Figure":
-    """Draw a result. A notebook shows the figure, and its method `savefig` writes PNG, PDF or SVG.
+    """Draw the figure of a result. Notebooks show it, and its method `savefig` writes PNG, PDF or SVG.
 
     Args:
-        result: of `compare`, `flss`, `physical_flss`, `record` or a study, fresh or as `load` reads it.
-        which: name of the figure, if there are several; by default the first.
+        result: dataset of `compare`, `flss`, `physical_flss`, `record` or a study, as computed or as `load` reads it.
+        which: name of the figure, if the result has several; by default the first.
 
     Raises:
-        InputError: no figure belongs to the dataset, or none has this name.
+        InputError: the dataset has no figure, or no figure with this name.
     """
     study = "recording" if "planned_stance" in result else str(result.attrs.get("study", ""))
     if study not in FIGURES:
-        raise InputError(f"A dataset of {study or 'no study'} has no figure; results of {', '.join(FIGURES)} have one")
+        raise InputError(f"study = {study or 'none'}; datasets of these studies have a figure: {', '.join(FIGURES)}")
     figures = FIGURES[study]
     module, function = figures[choice("which", which or next(iter(figures)), figures)].split(":")
     draw: Callable[[xr.Dataset], Figure] = getattr(import_module(f"hexmj.{module}"), function)
@@ -89,7 +89,7 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Figure":
 
 @contextmanager
 def as_shipped() -> Iterator[None]:
-    """Use matplotlib's own defaults inside the context, so that commands draw the same everywhere."""
+    """Use matplotlib's built-in defaults inside the context, so that commands draw the same on every machine."""
     from matplotlib import rc_context, rcdefaults
 
     with rc_context():
@@ -98,7 +98,7 @@ def as_shipped() -> Iterator[None]:
 
 
 def picture(width: float, height: float) -> "Figure":
-    """Return an empty figure of a size in inches, which notebooks show, and whose parts make room for each other."""
+    """Return an empty figure of this size [inches] with matplotlib's constrained layout, which notebooks can show."""
     from matplotlib.figure import Figure
 
     figure: Any = Figure(figsize=(width, height), layout="constrained")
@@ -113,23 +113,23 @@ def picture(width: float, height: float) -> "Figure":
 
 
 def head(figure: "Figure", *lines: str) -> None:
-    """Set the title of a figure. Empty lines are left out, and long ones are wrapped."""
+    """Set the title of a figure. Empty lines are left out, and long lines are wrapped."""
     figure.suptitle("\n".join(filter(None, lines)), fontsize=10, wrap=True)
 
 
 def in_figure(text: str) -> str:
-    """Return a text in which dollars do not begin a formula."""
+    """Escape the dollar signs of a text, since matplotlib would read them as the begin of a formula."""
     return text.replace("$", r"\$")
 
 
 def tidy(axes: "Axes") -> None:
-    """Draw a grid, and no frame above and on the right."""
+    """Draw a grid, and hide the upper and the right line of the frame."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", linewidth=0.8)
 
 
 def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
-    """Set up axes of FLSS against velocity."""
+    """Set labels, limits and ticks of axes that show FLSS against velocities, (velocity,)."""
     low, high = max(-BESIDE, velocities.min() - 0.1), min(1.0 + BESIDE, velocities.max() + 0.1)
     axes.set(xlabel=VELOCITY, xlim=(low, high), ylabel="FLSS", ylim=(-0.02, 1.02))
     if len(velocities) <= MOST_TICKS:
@@ -138,23 +138,23 @@ def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
 
 
 def frequency_curve(axes: "Axes", x: "np.ndarray | xr.DataArray", data: "xr.Dataset", name: str, **style: Any) -> None:
-    """Draw a frequency and its interval, `name`, `name_low` and `name_high`, against x, all (n,)."""
+    """Draw the frequency `name`, (n,), against x, (n,), with its interval from `name_low` to `name_high` as bars."""
     axes.errorbar(x, *interval(data, name), **CURVE | style)
 
 
 def interval(data: "xr.Dataset", name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return a frequency, (n,), and how far its interval reaches below and above it, (2, n)."""
+    """Return the frequency `name`, (n,), and the lengths of its error bars below and above, (2, n)."""
     low, middle, high = (data[name + end].values for end in ("_low", "", "_high"))
     return middle, np.stack([middle - low, high - middle])
 
 
 def heat_map(axes: "Axes", values: np.ndarray, texts: np.ndarray, **style: Any) -> "AxesImage":
-    """Draw numbers as colours, without a frame, and a text in every cell.
+    """Draw a heat map without a frame, with a text in every cell.
 
     Args:
-        axes: to draw in.
-        values: (row, column); NaN has no colour.
-        texts: (row, column).
+        axes: axes to draw in.
+        values: numbers shown as colours, (row, column); NaN has no colour.
+        texts: texts of the cells, (row, column); an empty text is not drawn.
         style: options of `Axes.imshow`.
     """
     image = axes.imshow(values, aspect="auto", **style)
@@ -168,6 +168,6 @@ def heat_map(axes: "Axes", values: np.ndarray, texts: np.ndarray, **style: Any) 
 
 
 def velocity_columns(axes: "Axes", velocities: np.ndarray) -> None:
-    """Label the columns of a heat map with velocities."""
+    """Label the columns of a heat map with velocities, (column,)."""
     axes.set_xticks(range(len(velocities)), [f"{v:g}" for v in velocities], fontsize=8)
     axes.set_xlabel(VELOCITY, fontsize=9)

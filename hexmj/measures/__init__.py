@@ -1,1 +1,1 @@
-"""The measures of stability: kinematic, measured and physical, and their comparison."""
+"""Measures of stability: kinematic (planned polygon), measured (feet in contact) and physical (falls)."""

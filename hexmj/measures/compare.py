@@ -1,4 +1,4 @@
-"""The measures of stability on the same starts: planned polygon, measured polygon, and falls."""
+"""Comparison of the measures of stability on the same starts: planned polygon, measured polygon, and falls."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEASURES = {"kinematic": "planned_loss", "measured": "measured_loss", "physical": "fall"}
-"""Measure of FLSS -> the outcome whose frequency it is."""
+"""Measure of FLSS -> outcome, the time of the event that the measure counts."""
 
 BESIDE = {"toppled": "topple"}
-"""The same for a second physical answer: the trunk tilts by more than `outcomes.TOPPLED`, in any direction."""
+"""Further measure -> outcome that it counts: the trunk tilts by more than `outcomes.TOPPLED`, in any direction."""
 
 AGREEMENT = ("both", "only_kinematic", "only_physical", "none")
-"""What a start can do: lose the planned stability, fall, both or none."""
+"""Cases of a start: planned loss and fall, planned loss only, fall only, or neither."""
 
 REPORTED = ("clearance", "tilt", "speed", "slip", "tracking", "depth", "saturation", "unreachable")
 """Outcomes that describe how well the body follows the plan."""
@@ -34,21 +34,21 @@ REPORTED = ("clearance", "tilt", "speed", "slip", "tracking", "depth", "saturati
 
 @dataclass(frozen=True)
 class Comparison(Study):
-    """Controllers on the same starts at every velocity, with a cell for each controller and velocity."""
+    """Walks of several controllers from the same starts at every velocity; a cell for each controller and velocity."""
 
     controllers: Mapping[str, Controller]
     """Controllers by their names in the result."""
     velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
-    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
+    """Velocities V_r as fractions of V_p, 0 <= V < 1; the final velocities when accelerating."""
     observation_time: str | float = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
     acceleration: Acceleration | None = None
-    """The accelerating procedure of Eq. 11."""
+    """The accelerating procedure of Eq. 11; without it the velocity is constant."""
     n_starts: int = field(default=60, kw_only=True)
     """Number of random starts, the same for every controller and velocity."""
 
     def cells(self) -> list[Cell]:
-        """Return the cells, each an `outcome_table`."""
+        """Return a cell for each controller and velocity, computed by `outcome_table`."""
         self.check_walks(self.velocities)
         return [
             Cell(f"{name}-V-{v:g}", outcome_table, {"walks": self.walks(v, t, self.conditions, controller)}, work=t)
@@ -57,7 +57,7 @@ class Comparison(Study):
         ]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return the table of `compare`."""
+        """Return the dataset that `compare` describes, from the datasets of all cells."""
         starts = draw_starts(self.n_starts, self.seed, self.stride)
         table = over_axes({"controller": len(self.controllers), "velocity": len(self.velocities)}, data).assign_coords(
             **tables.velocity_axis(*self.observed),
@@ -75,18 +75,18 @@ class Comparison(Study):
 
 @dataclass(frozen=True)
 class PhysicalFlss(Comparison):
-    """Physical FLSS of one controller over velocities."""
+    """The physical FLSS of one controller over velocities."""
 
     n_starts: int = field(default=200, kw_only=True)
     """Number of random starts, the same for every velocity."""
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return the table of `physical_flss`."""
+        """Return the dataset that `physical_flss` describes, from the datasets of all cells."""
         result = super().result(data)
         fell = tables.losses_by_sample(np.isfinite(result.fall.values[0]))
         table = tables.frequency_table(fell, result.sizes["start"], result.velocity.values, result.duration.values)
-        wanted = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
-        reported = result.isel(controller=0, drop=True)[[*wanted, "fall", *BESIDE.values(), *REPORTED]]
+        beside = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
+        reported = result.isel(controller=0, drop=True)[[*beside, "fall", *BESIDE.values(), *REPORTED]]
         return table.assign(reported.drop_vars("duration").data_vars).assign_attrs(result.attrs | {"study": "flss"})
 
 
@@ -107,22 +107,22 @@ def compare(
     """Return the kinematic, measured and physical FLSS of controllers over velocities, on the same starts.
 
     Args:
-        controllers: one, or several by name.
-        velocities: V_r, one or several (final ones when accelerating), each 0 <= V < 1.
+        controllers: one controller, or several controllers by name.
+        velocities: one or several V_r, each 0 <= V < 1; the final velocities when accelerating.
         n_starts, observation_time, seed, conditions, stride, acceleration: fields of `Comparison`.
-        folder: caches what is finished; None caches nothing.
-        study: `Comparison`, or a subclass with another table.
-        how: executor, threads and progress, see `sweep.Execution`; the result does not depend on it.
+        folder: directory in which finished cells are cached; None caches nothing.
+        study: `Comparison`, or a subclass that returns another table.
+        how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
 
     Returns:
         Over (controller, velocity): the FLSS of `MEASURES` and `BESIDE` with their 95 % Wilson intervals (`kinematic`,
-        `kinematic_low`, ...), the numbers of starts in each case of `AGREEMENT`, and `agreement`, the fraction of
-        starts for which the kinematic and the physical answer are the same. Over (controller, velocity, start): every
-        field of `physics.outcomes.Outcomes`.
+        `kinematic_low`, ...), the number of starts in each case of `AGREEMENT`, and `agreement`, the fraction of
+        starts with a planned loss and a fall, or with neither. Over (controller, velocity, start): every field of
+        `physics.outcomes.Outcomes`.
 
     Raises:
         InputError: an argument is out of range.
-        SimulationError: a walk does not settle, or diverges.
+        SimulationError: an insect does not come to rest at its start, or a walk diverges.
     """
     named = controllers if isinstance(controllers, Mapping) else {getattr(controllers, "name", "?"): controllers}
     walks: Any = {"n_starts": n_starts, "seed": seed, "conditions": conditions, "stride": stride}
@@ -136,23 +136,23 @@ def physical_flss(
     """Return the physical FLSS, the frequency with which the trunk touches the ground.
 
     Args:
-        controller: plans the walks.
-        velocities: V_r, one or several, each 0 <= V < 1.
-        n_starts: number of starts.
-        options: as of `compare`. The contact gap has no effect, unless the controller reads the legs.
+        controller: controller that plans the walks.
+        velocities: one or several V_r, each 0 <= V < 1.
+        n_starts: number of random starts.
+        options: other arguments of `compare`. `contact_gap` has no effect on falls without sensory feedback.
 
     Returns:
-        The table of `kinematic.flss`, and the frequency of `BESIDE` with its interval; over start the times of falls
-        and of `BESIDE`, and the outcomes `REPORTED`.
+        The variables of `kinematic.flss` for falls, and the frequency `toppled` with its interval; over
+        (velocity, start) the times `fall` and `topple`, and the outcomes `REPORTED`.
 
     Raises:
-        InputError, SimulationError: as `compare`.
+        InputError, SimulationError: see `compare`.
     """
     return compare(controller, velocities, n_starts=n_starts, study=PhysicalFlss, **options)
 
 
 def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr.Dataset":
-    """Add the FLSS of measures, with 95 % Wilson intervals, and `agreement` to outcomes over (..., start)."""
+    """Add the FLSS of each measure with its 95 % Wilson interval, and `agreement`, to outcomes over (..., start)."""
     new: dict[str, Any] = {}
     for measure, outcome in measures.items():
         lost = tables.happened(data[outcome]).transpose(..., "start")
@@ -164,7 +164,7 @@ def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr
 
 
 def physical_report(result: "xr.Dataset") -> dict[str, float]:
-    """Return how well the bodies followed their plans, over all walks of a comparison or a physical FLSS."""
+    """Return means and extremes over all walks of a result that show how well the bodies followed their plans."""
     return {
         "mean slip [mm/s]": result.slip.mean().item(),
         "tracking, 95th percentile [mm]": result.tracking.mean().item(),

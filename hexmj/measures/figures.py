@@ -1,4 +1,4 @@
-"""Captions of results, and the figures of FLSS against velocity."""
+"""Captions of the figures of all results, and the figures that show FLSS against velocity."""
 
 import json
 from collections.abc import Mapping
@@ -22,40 +22,40 @@ UNITS: dict[str, str] = {
     **dict.fromkeys(("ground_at", "ground_length", "aep0", "pep0", "pep_min"), "mm"),
     **dict.fromkeys(("lift_time", "landing_time", "longest_substep", "contact_gap", "settling_time"), "ms"),
 }
-"""Units of conditions and of a stride's fields; the others are numbers or names."""
+"""Field of `Conditions` or `Stride` -> its unit; the other fields are plain numbers or names."""
 
 SYMBOLS = {"vp": "$V_p$", "aep0": "AEP$_0$", "pep0": "PEP$_0$", "pep_min": "PEP_min"}
-"""Their names in a caption, where these differ."""
+"""Field of `Conditions` or `Stride` -> its symbol in a caption, if that is not the field's name."""
 
 FEW = 3
-"""Most controllers that a caption names, unless they do not plan as printed in 1998."""
+"""Maximum number of controllers whose names a caption lists; of more, it lists those that deviate from the paper."""
 
 COLUMNS = 3
-"""Most panels beside each other."""
+"""Maximum number of panels in a row."""
 
 
 def caption(result: "xr.Dataset", least: int | None = None) -> str:
     """Return a line for a figure's title: controllers, starts, observation time, V_p, and other settings.
 
-    Fields of the stride and conditions appear if they are not defaults. So does the `least` number of starts that a
-    frequency counts, if that is not all.
+    Fields of the stride and the conditions appear if they differ from their defaults. `least`, the minimum number of
+    starts behind any frequency of the figure, appears if it is below the number of all starts.
     """
-    made = settings(result)
-    words = [_controllers(made.get("controllers", {}), result)]
-    if "starts" in made:
-        words.append(starts_in_words(made["starts"]))
-    if (time := made.get("observation_time")) is not None:
+    recorded = settings(result)
+    words = [_controllers(recorded.get("controllers", {}), result)]
+    if "starts" in recorded:
+        words.append(starts_in_words(recorded["starts"]))
+    if (time := recorded.get("observation_time")) is not None:
         words.append(f"observation time {f'of {time:g} time units' if isinstance(time, float) else time}")
-    if "seed" in made:
-        words.append(f"seed {made['seed']}")
-    if acceleration := made.get("acceleration"):
+    if "seed" in recorded:
+        words.append(f"seed {recorded['seed']}")
+    if acceleration := recorded.get("acceleration"):
         words.append(f"a = {acceleration['rate']:g} from V = {acceleration['start']:g}")
-    usual = json.loads(json.dumps(asdict(Stride())))
-    changed = {name: value for name, value in (made.get("stride") or {}).items() if value != usual.get(name, value)}
+    default, stride = json.loads(json.dumps(asdict(Stride()))), recorded.get("stride") or {}
+    changed = {name: value for name, value in stride.items() if value != default.get(name, value)}
     words.append("other lines of the tips" if changed.pop("geometry", None) else "")
     words.append(", ".join(_term(name, value) for name, value in changed.items()))
-    if made.get("physical", True):
-        given = made.get("conditions") or {}
+    if recorded.get("physical", True):
+        given = recorded.get("conditions") or {}
         shown = {"vp", *unusual(given)}
         words.append(", ".join(_term(name, value) for name, value in given.items() if name in shown))
     if least not in (None, result.attrs.get("starts")):
@@ -64,12 +64,12 @@ def caption(result: "xr.Dataset", least: int | None = None) -> str:
 
 
 def starts_in_words(number: int) -> str:
-    """Return a number of starts as a text."""
+    """Return '1 start' or, for another number, 'N starts'."""
     return "1 start" if number == 1 else f"{number} starts"
 
 
 def network_rules(controller: Any) -> str:
-    """Return the order of updates and the model variant of a network that are not as printed, from its settings."""
+    """Return how the network with these settings deviates from the printed update order and model, or an empty text."""
     if not isinstance(controller, Mapping):
         return ""
     if "controller" in controller:
@@ -87,7 +87,7 @@ def network_rules(controller: Any) -> str:
 
 
 def comparison_figure(result: "xr.Dataset") -> "Figure":
-    """Draw FLSS against velocity with 95 % intervals, a panel for each controller, from `compare`."""
+    """Draw a result of `compare`: FLSS against velocity with 95 % intervals, a panel for each controller."""
     names = result.controller.values
     columns = min(COLUMNS, len(names))
     rows = -(-len(names) // columns)
@@ -109,7 +109,7 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
 
 
 def flss_figure(result: "xr.Dataset") -> "Figure":
-    """Draw FLSS against velocity with 95 % intervals, from `flss` or `physical_flss`."""
+    """Draw a result of `flss` or `physical_flss`: FLSS against velocity with 95 % intervals."""
     figure, kind = picture(6.4, 4.2), "physical" if "fall" in result else "kinematic"
     axes, data = figure.subplots(), result.rename(low="flss_low", high="flss_high").sortby("velocity")
     frequency_curve(axes, data.velocity, data, "flss", **{"markersize": 4.5} | MEASURE_STYLES[kind])
@@ -119,7 +119,7 @@ def flss_figure(result: "xr.Dataset") -> "Figure":
 
 
 def _controllers(controllers: Mapping[str, Any], result: "xr.Dataset") -> str:
-    """Return the names of a few controllers with what is not as printed in 1998, or only the latter for many."""
+    """Return the names of at most `FEW` controllers, or of those that deviate from the paper, with their deviations."""
     if axis := [result[name].values for name in ("controller", "entrant") if name in result.coords]:
         controllers = {name: controllers[name] for name in np.ravel(axis[0]).tolist() if name in controllers}
     few, rules = len(controllers) <= FEW, {name: network_rules(controllers[name]) for name in controllers}
@@ -127,7 +127,7 @@ def _controllers(controllers: Mapping[str, Any], result: "xr.Dataset") -> str:
 
 
 def _term(name: str, value: Any) -> str:
-    """Return a setting with its unit, without breaks."""
+    """Return the text 'name = value unit' of a setting, with no-break spaces."""
     number = f"{value:g}" if isinstance(value, float | int) else str(value)
     text = f"{SYMBOLS.get(name, name.replace('_', ' '))} = {number} {UNITS.get(name, '')}"
     return text.strip().replace(" ", "\N{NO-BREAK SPACE}")

@@ -1,4 +1,4 @@
-"""The kinematic measure: planned walks, their first losses, and FLSS, the frequency of these (paper, Section 3)."""
+"""The kinematic measure (paper, Section 3): planned walks, their first losses of static stability, and FLSS."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 RANGE = 1600 * SAMPLE
-"""Starts that a cell counts: seconds to minutes of one core."""
+"""Default number of starts in a cell, which takes one core seconds to minutes."""
 
 STRIDE = Stride()
 
@@ -47,12 +47,12 @@ def walk(
 
     Args:
         starts: tips at time 0, all standing, (start, leg) [mm].
-        controller: plans the walks.
+        controller: controller that plans the walks.
         velocity: V_r, or its final value V_r* when accelerating; one number or (start,), 0 <= V_r < 1.
         duration: observation time [time units].
         stride: step range, lines of the tips and time step.
         acceleration: the accelerating procedure of Eq. 11; without it V_r is constant.
-        threads: by default one per core; the result does not depend on it.
+        threads: number of threads, by default one per core; the result does not depend on it.
 
     Raises:
         InputError: a start, velocity or duration is out of range.
@@ -73,7 +73,7 @@ def first_loss(
 ) -> np.ndarray:
     """Return the time of the first loss of static stability (Eq. 7), (start,) [time units]; inf without a loss.
 
-    Arguments are those of `walk`, and `duration` may be (start,). No walk is kept.
+    The arguments are those of `walk`; `duration` may also be (start,). The walks are not kept in memory.
     """
     plan = begin(controller, starts, velocity, stride, acceleration, threads)
     steps, count = steps_within(duration, stride), len(plan.starts)
@@ -87,44 +87,44 @@ def first_loss(
 class KinematicFlss:
     """Kinematic FLSS of a controller, with a cell for each velocity and range of starts.
 
-    All ranges belong to one stream of random starts, and losses are counted by its samples of 1000. The counts do not
-    depend on how the stream is cut.
+    The ranges divide the seed's sequence of random starts. Losses are counted for each sample of 1000 starts of that
+    sequence, so that the result does not depend on the size of the ranges.
     """
 
     controller: Controller
     """Controller that plans the walks."""
     velocities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
+    """Velocities V_r as fractions of V_p, 0 <= V < 1; the final velocities when accelerating."""
     n_starts: int = 7 * SAMPLE
     """Number N of random starts, the same for every velocity."""
     observation_time: str | float = "walk"
-    """Observation time: 'walk', 'start' or a number [time units]."""
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
     seed: int = 0
     """Seed of the random starts."""
     stride: Stride = STRIDE
     acceleration: Acceleration | None = None
-    """The accelerating procedure of Eq. 11."""
+    """The accelerating procedure of Eq. 11; without it the velocity is constant."""
     range_of: int = RANGE
-    """Starts of a range; the last one may have fewer."""
+    """Number of starts that one cell counts; the last cell may have fewer."""
 
     def __post_init__(self) -> None:
-        settings_of(self.controller)  # raises before the work, not after it
+        settings_of(self.controller)  # raises InputError now rather than after the computation
         check_draw(self.n_starts, self.seed)
         whole("range_of", self.range_of, 1, MOST_STARTS)
         _ = self.observed
 
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Velocities and observation times [time units], both (velocity,)."""
+        """The velocities V_r and their observation times [time units], both (velocity,)."""
         return observed(self.velocities, self.observation_time, self.stride, self.acceleration)
 
     @property
     def places(self) -> Iterator[tuple[int, int]]:
-        """Index of the velocity and first start of each cell."""
+        """Pairs, in the order of the cells: index of the cell's velocity, and index of its first start."""
         return product(range(len(self.velocities)), range(0, self.n_starts, self.range_of))
 
     def cells(self) -> list[Cell]:
-        """Return the cells, each a `losses_of_range`."""
+        """Return a cell for each velocity and range of starts, computed by `losses_of_range`."""
         check_velocities(self.controller, self.velocities, self.stride, self.acceleration)
         cells = []
         for i, first in self.places:
@@ -136,7 +136,7 @@ class KinematicFlss:
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return the table of `flss`."""
+        """Return the dataset that `flss` describes, from the datasets of all cells."""
         losses = np.zeros((len(self.velocities), math.ceil(self.n_starts / SAMPLE)), dtype=int)
         for (i, first), counted in zip(self.places, data, strict=True):
             begin = first // SAMPLE
@@ -149,10 +149,10 @@ class KinematicFlss:
 def losses_of_range(
     walks: WalkSettings, first: int, threads: int | None = None, progress: Progress | None = None
 ) -> "xr.Dataset":
-    """Count the starts from `first` on that lose static stability, a slab at a time.
+    """Count losses of static stability among `walks.n_starts` starts, of which the first has the index `first`.
 
     Returns:
-        `losses`, (sample,), in the stream's samples of 1000 starts; the range may begin and end within a sample.
+        `losses`, (sample,), in samples of 1000 starts of the seed; the first and the last sample may be incomplete.
     """
     import xarray as xr
 
@@ -185,16 +185,16 @@ def flss(
     """Return the kinematic FLSS, I_N^t of Eq. 9, at each velocity, over the same starts.
 
     Args:
-        controller: plans the walks.
-        velocities: V_r, one or several (final ones when accelerating), each 0 <= V < 1.
+        controller: controller that plans the walks.
+        velocities: one or several V_r, each 0 <= V < 1; the final velocities when accelerating.
         n_starts, observation_time, seed, stride, acceleration: fields of `KinematicFlss`.
-        range_of: starts that are computed and cached together; the result does not depend on it.
-        folder: caches what is finished; None caches nothing.
-        how: executor, threads and progress, see `sweep.Execution`; the result does not depend on it.
+        range_of: number of starts that are computed and cached together; the result does not depend on it.
+        folder: directory in which finished cells are cached; None caches nothing.
+        how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
 
     Returns:
-        Over velocity: `flss`, its interval `low`, `high`, the standard deviation `sample_sd` over samples of 1000
-        starts, and the observation time `duration`.
+        Over velocity: `flss`, the ends `low` and `high` of its 95 % Wilson interval, the standard deviation `sample_sd`
+        over samples of 1000 starts, and the observation time `duration` [time units].
 
     Raises:
         InputError: an argument is out of range.
@@ -215,14 +215,14 @@ def flss_over_range(
     stride: Stride = STRIDE,
     threads: int | None = None,
 ) -> tuple[float, tuple[float, float]]:
-    """Return the kinematic FLSS over a range of velocities, J_N^t of Eq. 10: each start has a velocity of its own.
+    """Return the kinematic FLSS over a range of velocities, J_N^t of Eq. 10: each start has its own random velocity.
 
     Args:
-        controller: plans the walks.
-        low: least velocity of the uniform range W, 0 <= V < 1, and above 0 with the observation time 'walk'.
-        high: greatest velocity of the range.
-        n_starts, observation_time, seed, stride: as of `flss`; a named observation time depends on each velocity.
-        threads: by default one per core; the result does not depend on it.
+        controller: controller that plans the walks.
+        low: lowest velocity of the uniform range W, 0 <= V < 1, and above 0 with the observation time 'walk'.
+        high: highest velocity of the range W.
+        n_starts, observation_time, seed, stride: see `flss`; the times 'walk' and 'start' depend on each velocity.
+        threads: number of threads, by default one per core; the result does not depend on it.
 
     Returns:
         The frequency and its 95 % Wilson interval.
@@ -233,7 +233,7 @@ def flss_over_range(
     if not 0 <= number("low", low) <= number("high", high) < 1:
         raise InputError(f"velocity range {low} to {high}; expected 0 <= low <= high < 1")
     n_starts, seed = check_draw(n_starts, seed)
-    observation_duration(observation_time, low, stride)  # raises at V = 0, whatever is drawn
+    observation_duration(observation_time, low, stride)  # raises at V = 0, whatever velocities are drawn
     rng, count = np.random.default_rng([seed, 1]), 0
     for x in draw_slabs(n_starts, seed, stride):
         v = rng.uniform(low, high, len(x))

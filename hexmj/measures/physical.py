@@ -1,4 +1,4 @@
-"""Physical walks from start to end: `physical_walk` keeps them whole, `physical_outcomes` only how they went."""
+"""Physical walks: `physical_walk` keeps every step in memory, `physical_outcomes` only the outcome of each start."""
 
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -22,35 +22,33 @@ from hexmj.walks import PlannedWalk, Walk, copied, extent, footfall_html, joined
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhysicalWalk:
-    """Physical walks kept whole. After a fall everything measured is NaN, and no foot stands."""
+    """Every step of physical walks. After a fall all measured numbers are NaN, and no foot stands."""
 
     planned: PlannedWalk
-    """The kinematic plan; of a feedback plan, what it plans without feedback."""
+    """The kinematic plan; for a feedback plan, the same plan without sensory feedback."""
     ordered: PlannedWalk
-    """The plan that the legs followed; it differs from `planned` with feedback only, and then is NaN after a fall."""
+    """The plan that the legs followed: `planned`, or with feedback the plan as adjusted, which is NaN after a fall."""
     measured: Walk
-    """What the insect did: feet in contact, relative to its own centre of mass and heading."""
+    """The walk of the insect: feet in contact, and tips relative to its own centre of mass and heading."""
     outcomes: Outcomes
-    """How every start went."""
+    """Losses, falls and other numbers of every start."""
     qpos: np.ndarray
-    """(step, start, position) MuJoCo's positions at the end of each step of the plan."""
+    """(step, start, position) MuJoCo's `qpos` at the end of each step of the plan."""
     centre_of_mass: np.ndarray
-    """(step, start, 3) in the world [mm]."""
+    """(step, start, 3) position of the centre of mass in the world [mm]."""
     height: np.ndarray
-    """(step, start, leg) of the feet above the ground [mm]; negative if they sink in."""
+    """(step, start, leg) height of the feet above the ground [mm]; negative for a foot that has sunk in."""
     load: np.ndarray
-    """(step, start, leg) force of the ground on the feet along its normal without adhesion [g mm/s^2]; negative if
-    adhesion holds a foot that pulls. It is that of the next substep, and of the last one after the last step."""
+    """(step, start, leg) normal force of the ground on a foot minus its adhesion [g mm/s^2]; negative if adhesion holds
+    it down. Read in the first substep of the next step; after the last step, in the last substep."""
     conditions: Conditions
-    """Of the walk."""
     stride: Stride
-    """Of the plan."""
 
     def __repr__(self) -> str:
         return f"PhysicalWalk({extent(self.ordered)}; {self.outcomes!r})"
 
     def _repr_html_(self) -> str | None:
-        """Show the feet that are off the ground, in a notebook."""
+        """Return a diagram of the feet that are off the ground for notebooks, as HTML."""
         if len(self.measured.time) < 2 or not self.measured.stance.shape[1]:
             return None
         known, fall = ~np.isnan(self.measured.x[:, 0]), self.outcomes.fall[0]
@@ -70,18 +68,18 @@ def physical_walk(
     threads: int | None = None,
     progress: Progress | bool | None = None,
 ) -> PhysicalWalk:
-    """The physical walk of every start, kept whole.
+    """Return every step of the physical walks from some starts.
 
     Args:
         starts: tips at time 0, (start, leg) [mm]; all feet stand.
-        controller: plans the walks.
-        velocity: V_r, or its final value; one number or (start,).
+        controller: controller that plans the walks.
+        velocity: V_r, or its final value when accelerating; one number or (start,), 0 <= V_r < 1.
         duration: observation time [time units].
-        conditions: of the walk.
-        stride: of the plan.
-        acceleration: the accelerating procedure of Eq. 11.
-        threads: one per core unless given; the result does not depend on it.
-        progress: True shows a bar; or a function that is called with the fraction done since the last call.
+        conditions: V_p, body, ground and contacts of the walk.
+        stride: step range, lines of the tips and time step of the plan.
+        acceleration: the accelerating procedure of Eq. 11; without it V_r is constant.
+        threads: number of threads, by default one per core; the result does not depend on it.
+        progress: True shows a bar; a function is called with the fraction done since its last call.
 
     Raises:
         InputError, SimulationError: see `settle.settle` and `rollout.drive`.
@@ -104,10 +102,10 @@ def physical_walk_of_plan(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> PhysicalWalk:
-    """The physical walk of a plan at time 0, kept whole; without feedback the plan must go as `planned`.
+    """Return every step of the physical walk of a plan that is at time 0; `planned` is the same plan, without feedback.
 
     Raises:
-        InputError, SimulationError: see `rollout.drive`; or a plan without feedback differs from `planned`.
+        InputError, SimulationError: see `rollout.drive`; InputError also if a plan without feedback is not `planned`.
     """
     stride, so_far = settled.stride, WalkSoFar(settled, planned, threads)
     followed: list[PlannedWalk] = []
@@ -136,13 +134,13 @@ def physical_outcomes(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Outcomes:
-    """How every settled start goes, without keeping the walks.
+    """Return the outcomes of physical walks from starts at rest, without keeping the walks in memory.
 
-    The planned loss is always the kinematic one, without feedback: the same measure with and without it.
+    The planned loss is that of the plan without sensory feedback, whether the walk uses feedback or not.
 
     Args:
         settled: starts at rest, see `settle.settle`; the other arguments are those of `physical_walk`.
-        effort: adds up the work and the torques of the same walks.
+        effort: accumulates the work and the torques of these walks; None leaves them out.
 
     Raises:
         InputError, SimulationError: see `rollout.drive`.
@@ -168,7 +166,7 @@ def outcomes_of_plan(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Outcomes:
-    """How every settled start goes by a plan at time 0 with these losses, (start,) [time units]."""
+    """Return the outcomes of the physical walks of a plan at time 0, whose planned losses, (start,), are known."""
     so_far = OutcomesSoFar(settled, planned_loss)
     for chunk in drive(settled, plan, duration, push=push, threads=threads, progress=progress):
         so_far.add(chunk)
@@ -178,7 +176,7 @@ def outcomes_of_plan(
 
 
 def _until_fall(fall: np.ndarray, planned: PlannedWalk, followed: list[PlannedWalk], stride: Stride) -> PlannedWalk:
-    """The feedback plan that the legs followed, up to the step in which each start fell, (start,) [time units]."""
+    """Return the feedback plan that the legs followed, NaN after the `fall` of each start, (start,) [time units]."""
     steps = sum(len(part.time) for part in followed)
     walk = copied(joined([*followed, part_of(planned, slice(steps, None))]))
     over = walk.time[:, None] - stride.dt >= fall

@@ -1,4 +1,4 @@
-"""Base of the studies, and the cells that most of them have: physical walks of one controller at one velocity."""
+"""Base class of the studies, and the cell that most have: physical walks of one controller at one velocity."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,22 +25,22 @@ if TYPE_CHECKING:
     from hexmj.physics.settle import Settled
 
 GROUND = "ground", "ground_height", "ground_at", "ground_length", "ground_seed"
-"""Conditions of the ground, which some studies set."""
+"""Conditions that describe the ground; some studies set them and therefore hide them, see `Study.hidden`."""
 
 UNITS = {
     **dict.fromkeys(("planned_loss", "measured_loss", "fall", "topple"), "time unit"),
     **dict.fromkeys(("clearance", "tracking", "depth"), "mm"),
     **{"tilt": "rad", "slip": "mm/s"},
 }
-"""Units of `Outcomes`; the others are numbers."""
+"""Field of `Outcomes` -> its unit; the other fields are plain numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Settings that all studies share; the same starts walk in every cell.
+    """Settings that all studies share; every cell of a study walks from the same starts.
 
-    A subclass has `controller` or `controllers`, and `velocity` or `velocities` unless its velocities are fixed.
-    Fields `observation_time` and `acceleration` are there only if they can be chosen.
+    A subclass adds `controller` or `controllers`, and `velocity` or `velocities` unless its velocities are fixed. It
+    adds `observation_time` and `acceleration` only if users may choose them.
     """
 
     n_starts: int = 100
@@ -51,40 +51,40 @@ class Study:
     stride: Stride = Stride()
 
     hidden: ClassVar[tuple[str, ...]] = ()
-    """Conditions that the study sets itself, so that they must keep their defaults."""
+    """Conditions that the study sets itself; in `conditions` they must have their defaults."""
 
     def __post_init__(self) -> None:
         check_draw(self.n_starts, self.seed)
         distinct("controllers", [*self.plans()])
         for controller in self.plans().values():
-            settings_of(controller)  # raises before the work, not after it
-        given, usual = self.conditions.values(), type(self).conditions.values()
+            settings_of(controller)  # raises InputError now rather than after the computation
+        given, default = self.conditions.values(), type(self).conditions.values()
         for name in self.set_by_study:
-            if given[name] != usual[name]:
-                raise InputError(f"{name} = {given[name]}; the study sets it, so that it must stay {usual[name]}")
+            if given[name] != default[name]:
+                raise InputError(f"{name} = {given[name]}; expected {default[name]}, since the study sets it itself")
         if "ground" not in self.set_by_study:
             check_ground(self.conditions)
         _ = self.observed
 
     @property
     def set_by_study(self) -> tuple[str, ...]:
-        """The conditions `hidden`, and others that depend on the study's fields."""
+        """All conditions that the study sets itself; a subclass may choose them by its fields."""
         return self.hidden
 
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Velocities and observation times [time units], both (velocity,)."""
+        """The velocities V_r and their observation times [time units], both (velocity,)."""
         own: Any = self
         velocities = own.velocities if hasattr(self, "velocities") else [own.velocity]
         return observed(velocities, getattr(self, "observation_time", "walk"), self.stride, self.procedure)
 
     @property
     def procedure(self) -> Acceleration | None:
-        """The accelerating procedure, if there is one."""
+        """The accelerating procedure of Eq. 11, or None."""
         return getattr(self, "acceleration", None)
 
     def plans(self) -> Mapping[str, Controller]:
-        """Return all controllers by name."""
+        """Return all controllers of the study by name."""
         own: Any = self
         return (
             own.controllers if hasattr(self, "controllers") else {getattr(own.controller, "name", "?"): own.controller}
@@ -93,13 +93,13 @@ class Study:
     def walks(
         self, velocity: float, duration: float, conditions: Conditions, controller: Controller | None = None
     ) -> WalkSettings:
-        """Return the settings of a cell in which all starts walk with a controller, by default the only one."""
+        """Return the settings of a cell in which all starts walk with a controller, by default the study's first."""
         controller = controller or next(iter(self.plans().values()))
         same = self.n_starts, self.seed, conditions, self.stride, self.procedure
         return WalkSettings(controller, velocity, duration, *same)
 
     def check_walks(self, velocities: Sequence[float], *conditions: Conditions) -> None:
-        """Raise InputError if a controller refuses a velocity, or feet with adhesion cannot be settled."""
+        """Raise InputError if a controller refuses a velocity or adhesion presses the feet too deep into the ground."""
         from hexmj.physics.settle import check_adhesion
 
         for controller in self.plans().values():
@@ -108,22 +108,22 @@ class Study:
             check_adhesion(varied, self.stride, self.seed)
 
     def labelled(self, table: "xr.Dataset", study: str, **own: Any) -> "xr.Dataset":
-        """Return a result with the settings that repeat the study as attributes.
+        """Return a result with all settings of the study as attributes, from which it can be repeated.
 
         Args:
-            table: the result.
-            study: its name, which `hexmj.plot` reads.
-            own: settings beside those of all studies, or in their place.
+            table: the result without these attributes.
+            study: name of the study, by which `hexmj.plot` finds its figures.
+            own: settings of this study only; they replace settings of all studies that have the same name.
         """
         time = getattr(self, "observation_time", "walk")
-        made = settings(self.plans(), time, self.n_starts, self.seed, self.stride, self.procedure)
+        shared = settings(self.plans(), time, self.n_starts, self.seed, self.stride, self.procedure)
         conditions = {k: v for k, v in self.conditions.settings().items() if k not in self.set_by_study}
-        return table.assign_attrs(attributes({"study": study} | made | own | {"conditions": conditions}))
+        return table.assign_attrs(attributes({"study": study} | shared | own | {"conditions": conditions}))
 
 
 @lru_cache(maxsize=1)
 def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None) -> "Settled":
-    """Return the seed's starts at rest; cached, since all controllers begin with the same starts."""
+    """Return the random starts of a seed after they have come to rest; cached, since all controllers share them."""
     from hexmj.physics.settle import settle
 
     return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
@@ -133,7 +133,7 @@ def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Str
 def standing_starts(
     n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None
 ) -> np.ndarray:
-    """Return the indices of the seed's starts that come to rest on six feet; cached for the other velocities."""
+    """Return the indices of a seed's starts that come to rest on six feet; cached, since all velocities share them."""
     from hexmj.physics.settle import settle
 
     starts, everyone = draw_starts(n_starts, seed, stride), np.arange(n_starts)
@@ -144,14 +144,14 @@ def standing_starts(
 def by_halves(
     which: np.ndarray, walk: Callable[[np.ndarray], Any], diverging: bool = False
 ) -> Iterator[tuple[np.ndarray, Any]]:
-    """Yield parts of the starts with what they return; starts that have no outcome are left out.
+    """Walk starts, halve them wherever walks fail, and yield the indices of each part that succeeds with its outcomes.
 
-    A start has none if it cannot stand, its tips are out of reach or a push still acts at the end.
+    A walk fails if its start cannot stand, its foot targets are out of reach or a push still acts at its end.
 
     Args:
         which: indices of the starts, (n,).
-        walk: walks some of the starts, (n,); the outcome of a start must not depend on the others.
-        diverging: whether walks that diverge are left out too; else they are an error.
+        walk: returns the outcomes of starts, given by index; outcomes of a start must not depend on the other starts.
+        diverging: whether walks that diverge are left out too; if False, they raise a SimulationError.
     """
     try:
         yield which, walk(which)
@@ -163,7 +163,7 @@ def by_halves(
 
 
 def kept_walk(walks: WalkSettings, starts: np.ndarray, threads: int | None) -> "PhysicalWalk":
-    """Return physical walks, kept whole, from some starts, (start, leg) [mm]."""
+    """Return every step of the physical walks from `starts`, tips at time 0, (start, leg) [mm]."""
     from hexmj.measures.physical import physical_walk
 
     how: Any = {"conditions": walks.conditions, "stride": walks.stride, "acceleration": walks.acceleration}
@@ -171,7 +171,7 @@ def kept_walk(walks: WalkSettings, starts: np.ndarray, threads: int | None) -> "
 
 
 def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
-    """Return every field of `Outcomes` over start."""
+    """Return every field of `Outcomes`, (start,), of the physical walks with these settings."""
     from hexmj.measures.physical import physical_outcomes
 
     settled = settled_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)

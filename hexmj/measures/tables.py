@@ -1,4 +1,4 @@
-"""Settings of walks, and tables of results: axes, frequencies with 95 % intervals, recorded settings."""
+"""Settings of walks, and parts of result tables: axes, frequencies with 95 % intervals, recorded settings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -17,24 +17,24 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FRESH = 17
-"""A seed on whose starts no preset was searched."""
+"""Seed of starts on which no preset was optimised."""
 
 PERIODS = 40
-"""Cycles of every leg until its steady-state gait is measured."""
+"""Default number of cycles that every leg walks until its steady-state gait is measured."""
 
 VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
-"""Attributes of an axis of velocities."""
+"""Attributes of the coordinate `velocity`."""
 
 Dims = tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class WalkSettings:
-    """Settings of the walks of a cell."""
+    """Settings of walks from random starts, which together are one cell of a study."""
 
     controller: Controller
     velocity: float
-    """V_r, or its final value when accelerating."""
+    """Velocity V_r as a fraction of V_p; the final velocity when accelerating."""
     duration: float
     """Observation time [time units]."""
     n_starts: int
@@ -50,7 +50,7 @@ class WalkSettings:
 
 
 def reach(stride: Stride) -> tuple[float, float]:
-    """Distance ahead of O that a front foot can have, and distance behind O that a hind foot can have [mm]."""
+    """Return how far a front foot can be ahead of O, and how far a hind foot can be behind O [mm]."""
     origin = stride.geometry.origin
     return max(origin) + stride.aep0, -(min(origin) + stride.pep_min)
 
@@ -61,7 +61,7 @@ def observed(
     stride: Stride,
     acceleration: Acceleration | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the velocities of a table and their observation times [time units], both (velocity,).
+    """Return the velocities V_r and their observation times [time units], both (velocity,), after a check.
 
     Raises:
         InputError: a velocity is out of range, occurs twice or is not reached within its time, or a time is too short.
@@ -75,7 +75,7 @@ def observed(
 
 
 def velocity_axis(v: np.ndarray, duration: np.ndarray) -> dict[str, Any]:
-    """Return the coordinates for velocities and their observation times, both (velocity,)."""
+    """Return the coordinates `velocity` and `duration` for velocities and their observation times, both (velocity,)."""
     return {
         "velocity": ("velocity", v, VELOCITY),
         "duration": ("velocity", duration, {"units": "time unit", "long_name": "observation time t"}),
@@ -90,7 +90,7 @@ def settings(
     stride: Stride,
     acceleration: Acceleration | None,
 ) -> dict[str, Any]:
-    """Return what is needed to repeat a measure as plain data; every result records it."""
+    """Return the settings from which a measurement can be repeated as plain data; every result records them."""
     return {
         "controllers": {name: settings_of(controller) for name, controller in controllers.items()},
         "observation_time": observation_time,
@@ -102,7 +102,7 @@ def settings(
 
 
 def over_start(columns: Mapping[str, np.ndarray], units: Mapping[str, str] = {}) -> "xr.Dataset":
-    """Return a table of columns, (start,) each; a column without a unit is a plain number."""
+    """Return columns, each (start,), as a dataset over start; a column that is missing in `units` is a plain number."""
     import xarray as xr
 
     return xr.Dataset({name: ("start", values, {"units": units.get(name, "1")}) for name, values in columns.items()})
@@ -112,18 +112,18 @@ def losses_by_sample(lost: np.ndarray, first: int = 0) -> np.ndarray:
     """Count losses in each sample of 1000 starts.
 
     Args:
-        lost: (velocity, start), of the starts from `first` on.
-        first: index of the first start; the samples at both ends may have fewer starts.
+        lost: whether each start loses stability, (velocity, start).
+        first: index of the first of these starts in its seed; the first and the last sample may be incomplete.
 
     Returns:
-        (velocity, sample).
+        Number of losses, (velocity, sample).
     """
     begin = np.arange(-(first % SAMPLE), lost.shape[1], SAMPLE).clip(0)
     return np.add.reduceat(lost, begin, axis=1, dtype=int)
 
 
 def frequency_table(losses: np.ndarray, n_starts: int, velocities: np.ndarray, duration: np.ndarray) -> "xr.Dataset":
-    """Return FLSS with its intervals over velocity, from the losses in each sample, (velocity, sample)."""
+    """Return FLSS with its 95 % interval over velocity, from the losses in each sample, (velocity, sample)."""
     import xarray as xr
 
     total = losses.sum(axis=1)
@@ -141,22 +141,22 @@ def frequency_table(losses: np.ndarray, n_starts: int, velocities: np.ndarray, d
 
 
 def happened(time: "xr.DataArray") -> "xr.DataArray":
-    """Return whether an event took place: 1 or 0, and NaN where the walk failed."""
+    """Return 1 where an event has a finite time, 0 where its time is inf, and NaN where its walk failed."""
     return (time < np.inf).where(time.notnull())
 
 
 def over_cells(sizes: Mapping[str, int], data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-    """Combine cells as `over_axes` does; starts and variables that a cell does not have are NaN."""
+    """Combine cells over axes as `over_axes` does; starts and variables that are missing in a cell become NaN."""
     numbered = [cell.assign_coords(start=np.arange(cell.sizes.get("start", 0))) for cell in data]
     return over_axes(sizes, numbered, join="outer", data_vars="all").transpose(*sizes, "start")
 
 
 def frequency(name: str, events: np.ndarray, dims: Dims) -> dict[str, Any]:
-    """Return a frequency with its 95 % Wilson interval, as variables.
+    """Return the frequency of an event with its 95 % Wilson interval, as variables of a dataset.
 
     Args:
-        name: of the frequency; the interval is `name_low`, `name_high`.
-        events: (..., start), 0 or 1; NaN does not count.
+        name: name of the frequency; the ends of its interval are `name_low` and `name_high`.
+        events: 1 for starts with the event and 0 without, (..., start); starts with NaN are left out.
         dims: names of the axes before `start`.
     """
     starts, count = np.isfinite(events).sum(axis=-1), np.nansum(events, axis=-1)
@@ -165,24 +165,24 @@ def frequency(name: str, events: np.ndarray, dims: Dims) -> dict[str, Any]:
 
 
 def frequencies(name: str, events: np.ndarray, dims: Dims) -> dict[str, Any]:
-    """Return what `frequency` does, and the number of starts, `name_starts`."""
+    """Return the variables of `frequency`, and `name_starts`, the number of starts without NaN."""
     starts = np.isfinite(events).sum(axis=-1)
     return frequency(name, events, dims) | {f"{name}_starts": (dims, starts, {"units": "1"})}
 
 
 def differences(name: str, events: np.ndarray, others: np.ndarray, dims: Dims) -> dict[str, Any]:
-    """Return how much more frequent events are than others on the same starts, with the 95 % interval.
+    """Return the frequency of `events` minus that of `others` on the same starts, with its 95 % interval.
 
     Args:
-        name: of the difference; the interval is `name_low`, `name_high`.
-        events: (..., start), 0 or 1; NaN does not count.
-        others: broadcasts to the shape of `events`.
+        name: name of the difference; the ends of its interval are `name_low` and `name_high`.
+        events: 1 for starts with the event and 0 without, (..., start); starts with NaN are left out.
+        others: the same for the events to compare with; broadcast to the shape of `events`.
         dims: names of the axes before `start`.
     """
     return columns(name, dims, *paired_difference(events, np.broadcast_to(others, events.shape)))
 
 
 def columns(name: str, dims: Dims, *values: np.ndarray) -> dict[str, Any]:
-    """Return a number and the ends of its interval as the variables `name`, `name_low` and `name_high`."""
+    """Return up to three arrays, a value and the ends of its interval, as variables `name`, `name_low`, `name_high`."""
     ends = zip(("", "_low", "_high"), values, strict=True)
     return {f"{name}{end}": (dims, number, {"units": "1"}) for end, number in ends}
