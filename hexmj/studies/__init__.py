@@ -1,1 +1,1 @@
-"""Questions of the paper's Section 6 that only a body, or a disturbance, can answer."""
+"""Studies, most of which address questions of the paper's Section 6 with a simulated body or with disturbances."""

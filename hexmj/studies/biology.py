@@ -1,6 +1,6 @@
-"""The walking insect beside measured insects: forces, torques, gait, posture and work, with the sources of figures.
+"""The simulated insect compared with real insects: forces, torques, gait, posture and work, with literature sources.
 
-Ranges are those of the sources, which say how words were read; NaN stands where no figure was found.
+The ranges of real insects come from `SOURCES`, which also say how verbal statements became numbers; NaN is unknown.
 """
 
 import math
@@ -48,50 +48,50 @@ SOURCES = {
     "not read": "measured in walking Carausius by Cruse 1976 and Dallmann et al. 2016, whose figures we have not seen",
     "": "",
 }
-"""Short name -> source."""
+"""Short name of a source -> reference, what it reports, and how that is converted to a range."""
 
 ANY = math.inf
-"""Bound of a quantity of which only the sign is known."""
+"""Bound of a range of which only the sign is known, for example 0 to `ANY`."""
 
-STEP = 16.0, 20.0  # mm
-SWING_SHARE, SWING_REST = (0.10, 0.16), (0.14, 0.17)  # of the period, s
-SEEN_PHASES = {22.0: (0.60, 0.69), 31.0: (0.54, 0.61), 38.0: (0.50, 0.53)}  # at mm/s
-COXAE = {"front": 12.0, "middle": 10.0, "hind": 8.0}  # mm, "about"
-ABOUT, APART = 1.0, 28.5  # mm: how "about" is read, and front from hind coxae
-OXYGEN = 20.1  # J/ml
-STANCE = 0.784  # s
+STEP = 16.0, 20.0  # lowest and highest distance that a foot moves back relative to the body in a stance [mm]
+SWING_SHARE, SWING_REST = (0.10, 0.16), (0.14, 0.17)  # swing duration: fraction of the period, and time [s]
+SEEN_PHASES = {22.0: (0.60, 0.69), 31.0: (0.54, 0.61), 38.0: (0.50, 0.53)}  # speed [mm/s] -> ipsilateral phases
+COXAE = {"front": 12.0, "middle": 10.0, "hind": 8.0}  # height of the coxae [mm]
+ABOUT, APART = 1.0, 28.5  # tolerance of the heights in COXAE, and distance from front to hind coxae [mm]
+OXYGEN = 20.1  # energy from oxygen [J/ml]
+STANCE = 0.784  # duration of the stance in Zill et al. 2018 [s]
 PAST, PAST_HALF = "coxa-trochanter torque past half its peak,", {"from": 13.2 / STANCE, "until": 71.0 / STANCE}  # %
 
 SPEED = 24.0
-"""Default speed [mm/s]; V = 0.3 at V_p = 80 mm/s."""
+"""Default speed at which a quantity is compared [mm/s]: V_r = 0.3 at V_p = 80 mm/s."""
 
 
 @dataclass(frozen=True)
 class Animal:
-    """A quantity as measured in insects; NaN without a figure."""
+    """The range of a quantity in real insects, `low` to `high`; NaN if no number was found in the literature."""
 
     quantity: str
-    """Name in `quantities.UNITS`."""
+    """Name of the quantity, a key of `quantities.UNITS`."""
     low: float = math.nan
     high: float = math.nan
     source: str = ""
     """A key of `SOURCES`."""
     speed: float = SPEED
-    """Speed at which the model is measured [mm/s]."""
+    """Speed at which the simulated insect is measured [mm/s]."""
     depends: bool = False
-    """Whether the animals' figure holds at this speed only."""
+    """Whether the animals' range holds at this speed only."""
     built_in: bool = False
-    """Whether the body or V_p was chosen by it, so that agreement shows nothing."""
+    """Whether the model's body or V_p was chosen to match this range, so that agreement is no evidence."""
 
     def verdict(self, value: float) -> Verdict:
-        """Compare a mean of the model; NaN if it was measured in no start."""
+        """Compare a mean of the simulated insect, NaN if no start has a value, with the animals' range."""
         if math.isnan(self.low) or math.isnan(value):
             return "no figure found" if math.isnan(self.low) else "none measured"
         return "below" if value < self.low else "above" if value > self.high else "within"
 
 
 def timing(speed: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the least and the greatest period [s] and duty factor at a speed [mm/s], from a stance of s / v."""
+    """Return the ranges of the period [s] and of the duty factor at a speed [mm/s]; a stance lasts `STEP` / speed."""
     (short, long), (share, most), (rest, slowest) = ([x / speed for x in STEP], SWING_SHARE, SWING_REST)
     period = (short + rest) / (1.0 - share), (long + slowest) / (1.0 - most)
     duty = short * (1.0 - most) / (short + slowest), long * (1.0 - share) / (long + rest)
@@ -99,7 +99,7 @@ def timing(speed: float) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def _each(name: str, low: float = math.nan, high: float = math.nan, source: str = "") -> list[Animal]:
-    """Return a row for each pair of legs."""
+    """Return a row for front, middle and hind legs, with the same range."""
     return [Animal(f"{name}, {segment}", low, high, source) for segment in SEGMENTS]
 
 
@@ -133,23 +133,23 @@ ANIMALS = (
     Animal("positive work of the joints", 4.6 * OXYGEN, 8.5 * OXYGEN, "Full et al. 1990"),
     Animal("work on the centre of mass", 0.9, 0.9, "Full, Tu 1990"),
 )
-"""The rows of the table."""
+"""All rows of the table: quantities, some of them at several speeds, with their ranges in real insects."""
 
 SPEEDS = tuple(sorted({row.speed for row in ANIMALS}))
-"""Speeds at which the model is measured [mm/s]."""
+"""Speeds at which the simulated insect walks [mm/s]."""
 
 MEASURED = 3
-"""Periods of a single leg at the end of a walk that are measured, as far as they are whole strides."""
+"""Periods of a single leg at the end of a walk in which whole strides are measured."""
 
 FIELDS = {"quantity": "name", "speed": "at", "low": "animal_low", "high": "animal_high"}
 """Field of `Animal` -> its name in the result, where they differ."""
 
 HEADS = ("quantity", "ours (95 %)", "insects", "verdict on the mean", "source")
-"""Heads of the table."""
+"""Column headings of the table."""
 
 OURS: dict[str, Any] = CURVE | {"color": "#1b6ca8"}
 INSECTS = "#e08e1b"
-"""Style of the model, and colour of the insects' ranges."""
+"""Colour of the ranges of real insects; `OURS` is the style of the simulated insect."""
 
 OVER_SPEED = {
     "phase, ipsilateral": "ipsilateral phase",
@@ -157,18 +157,18 @@ OVER_SPEED = {
     "period": "period [s]",
     "ripple: least over mean speed": "least over mean speed",
 }
-"""Quantity -> label of its axis."""
+"""Quantity drawn over speed -> label of its axis."""
 
 BARS = {
     "force on both legs [% of the weight]": ("vertical impulse", "fore-aft impulse", "inward impulse"),
     "torque of a standing leg [mN mm]": tuple(f"{joint} torque" for joint in JOINTS),
 }
-"""Label of an axis -> quantities that stand side by side for each pair of legs."""
+"""Label of an axis -> quantities whose bars stand side by side, for each pair of legs."""
 
 
 @dataclass(frozen=True)
 class Biology(Study):
-    """The same starts at every speed at which the animal was measured."""
+    """Physical walks from the same starts at every speed at which real insects were measured."""
 
     controller: Controller
     """Controller that plans the walks."""
@@ -186,12 +186,11 @@ class Biology(Study):
 
     @property
     def velocities(self) -> list[float]:
-        """V_r at each speed."""
+        """V_r = speed / V_p at each speed of `SPEEDS`."""
         return np.divide(SPEEDS, self.conditions.vp).tolist()
 
     def cells(self) -> list[Cell]:
-        """Return a cell for each speed."""
-
+        """Return a cell for each of the `SPEEDS`, computed by `quantity_table`."""
         self.check_walks(self.velocities)
         cells = []
         for speed, velocity in zip(SPEEDS, self.velocities, strict=True):
@@ -202,13 +201,14 @@ class Biology(Study):
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return the quantities of the model beside those of the animals.
+        """Return the quantities of the simulated insect beside the ranges of real insects.
 
         Returns:
             Over (speed, quantity, start): `value`, NaN where a start fell or made no whole stride. Over row, one for
-            each of `ANIMALS`: `name`, `unit`, the speed `at` which it holds and whether it `depends` on it; `mean` over
-            the starts with its 95 % interval `low`, `high`; `animal_low`, `animal_high` and `source`; the `verdict` on
-            the mean, and whether it was `built_in`; and the number of starts that `walked`.
+            each of `ANIMALS`: `name`, `unit`, the speed `at` which it is compared and whether its range `depends` on
+            the speed; the `mean` over the starts with its 95 % interval `low`, `high`; the range `animal_low`,
+            `animal_high` and its `source`; the `verdict` on the mean; whether the range was `built_in` to the body;
+            and the number of starts that `walked` whole strides.
         """
         import xarray as xr
 
@@ -229,7 +229,7 @@ class Biology(Study):
 
 
 def _mean(values: np.ndarray, quantity: str) -> tuple[float, float, float]:
-    """Return the mean of the known values and its 95 % interval by Student's t; phases may go beyond 0 or 1."""
+    """Return the mean of finite values, (start,), and its 95 % interval by Student's t, which may leave [0, 1)."""
     from scipy.special import stdtrit
 
     known = unrolled(values) if (phase := quantity in PHASES) else values
@@ -242,14 +242,14 @@ def _mean(values: np.ndarray, quantity: str) -> tuple[float, float, float]:
 
 
 def walked_in_words(result: "xr.Dataset") -> str:
-    """Return the number of starts that walked whole strides at each speed as a text."""
+    """Return a text with the number of starts that walked whole strides at each speed."""
     count = result.value.sel(quantity="speed").notnull().sum("start").values
     numbers = zip(count, result.speed.values, strict=True)
     return ", ".join(f"{n} of {result.sizes['start']} at {speed:g} mm/s" for n, speed in numbers)
 
 
 def table_rows(result: "xr.Dataset") -> Iterator[tuple[str, ...]]:
-    """Yield the rows of the table under `HEADS`."""
+    """Yield the rows of the table, each with a text for every column of `HEADS`."""
     for n in range(result.sizes["row"]):
         row = {name: result[name].values[n] for name in result.data_vars if result[name].dims == ("row",)}
         at = f" at {row['at']:g} mm/s" if row["depends"] else ""
@@ -261,7 +261,7 @@ def table_rows(result: "xr.Dataset") -> Iterator[tuple[str, ...]]:
 
 
 def biology_markdown(result: "xr.Dataset") -> str:
-    """Return the table and its sources as Markdown."""
+    """Return the comparison with real insects and its sources as a Markdown table and list."""
     named = {*result.source.values}
     sources = [f"- {name}: {text}" for name, text in SOURCES.items() if name in named and text]
     walks = f"Starts with whole strides: {walked_in_words(result)}."
@@ -269,7 +269,7 @@ def biology_markdown(result: "xr.Dataset") -> str:
 
 
 def _range(low: float, high: float) -> str:
-    """Return a range as a text; "-" if it is not known."""
+    """Return a range as a text such as "1 to 2", "above 1" or "1"; "-" if it is unknown."""
     if math.isnan(low):
         return "-"
     if math.isinf(low) or math.isinf(high):
@@ -278,7 +278,7 @@ def _range(low: float, high: float) -> str:
 
 
 def biology_figure(result: "xr.Dataset") -> "Figure":
-    """Draw bars for each pair of legs, and quantities over speed beside the animals' ranges."""
+    """Draw forces and torques as bars for each pair of legs, and gait over speed with the ranges of real insects."""
     figure = picture(11.0, 6.4)
     axes = figure.subplots(2, 3).ravel()
     for panel, (label, names) in zip(axes[:2], BARS.items(), strict=True):
@@ -294,7 +294,7 @@ def biology_figure(result: "xr.Dataset") -> "Figure":
 
 
 def _bars(axes: "Axes", values: "xr.DataArray", names: tuple[str, ...]) -> None:
-    """Draw means over the starts, (quantity, start), a group for each pair of legs."""
+    """Draw means over the starts of `values`, (quantity, start), as a group of bars for each pair of legs."""
     for n, name in enumerate(names):
         middle, ends = _means(values.sel(quantity=[f"{name}, {segment}" for segment in SEGMENTS]), name)
         label = name.removesuffix(" impulse").removesuffix(" torque")
@@ -308,7 +308,7 @@ def _bars(axes: "Axes", values: "xr.DataArray", names: tuple[str, ...]) -> None:
 
 
 def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
-    """Draw a quantity, (speed, start), and the animals' ranges, at one speed or at any."""
+    """Draw means over the starts of `values`, (speed, start), against speed, with the ranges of real insects."""
     for row in ANIMALS:
         if row.quantity == name:
             ends = (row.speed - 0.4, row.speed + 0.4) if row.depends else (20.0, 40.0)
@@ -320,6 +320,6 @@ def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
 
 
 def _means(values: "xr.DataArray", quantity: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the means of rows, (row, start), and how far their intervals reach below and above, (2, row)."""
+    """Return the mean over the starts in each row of (row, start), and error bars below and above, (2, row)."""
     middle, low, high = np.transpose([_mean(row, quantity) for row in np.asarray(values)])
     return middle, np.stack([middle - low, high - middle])

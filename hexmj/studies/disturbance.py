@@ -1,7 +1,7 @@
 """Disturbed walks, kinematic and physical: the effect of a halt, a stopped leg or a push, and of three strategies.
 
-At every velocity the same starts are disturbed in the same way at the same times, whatever the strategy. They are the
-seed's first starts whose plan is stable until then.
+At every velocity, all strategies face the same disturbances of the same starts at the same times. These starts are the
+seed's first starts whose plan keeps static stability until the disturbance.
 """
 
 from collections.abc import Sequence
@@ -28,19 +28,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURES = {"kinematic": "planned_loss", "physical": "fall"}
-"""Measure of FLSS -> the time whose frequency it is."""
-
+"""Measure of FLSS -> outcome, the time of the event that the measure counts."""
 STYLES: dict[str, dict[str, Any]] = dict(zip(("none", "reorganise", "slow_down", "grasp"), SERIES, strict=False))
-"""Styles of the strategies."""
+"""Strategy -> style of its curve."""
 
 PHYSICAL = ("push", "grasp")
-"""Disturbances and strategies that act on the body only."""
+"""Disturbances and strategies that act on the simulated body and leave the plan unchanged."""
 
 MOST_IMPULSE = 80.0
-"""Largest impulse in multiples of m V_p; larger ones throw the insect into the air."""
+"""Maximum impulse of a push, in multiples of m V_p; a larger impulse throws the insect into the air."""
 
 SHIFTS = dict(zip(STYLES, np.linspace(-0.012, 0.012, len(STYLES)), strict=True))
-"""How far their points stand beside the velocity."""
+"""Strategy -> shift of its points in V_r / V_p, so that the points of one velocity do not overlap."""
 
 UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "marker": "x", "label": "undisturbed"}
 ROWS = {"kinematic": "kinematic", "physical": "falls (physical)"}
@@ -49,31 +48,31 @@ ROWS = {"kinematic": "kinematic", "physical": "falls (physical)"}
 
 @dataclass(frozen=True)
 class DisturbedWalks(Study):
-    """The same starts in every case, an undisturbed one among them, at every velocity."""
+    """Walks from the same starts, undisturbed and with every disturbance and strategy, at every velocity."""
 
     controller: Controller
-    """Controller that plans the walks; its plans can be steered."""
+    """Controller whose plans can be steered (see `SteerableController`), with or without sensory feedback."""
     velocities: Sequence[float] = (0.3, 0.5, 0.7)
     """Velocities V_r as fractions of V_p, 0 < V < 1."""
     disturbances: Sequence[Kind] = ("halt", "leg", "push")
-    """The body is halted, one protracting leg is stopped, or the body is pushed from the side."""
+    """Disturbances: the body is halted, one protracting leg is stopped, or the body is pushed from the side."""
     impulses: Sequence[float] = (40.0, 60.0)
     """Impulses of the pushes, in multiples of the insect's mass times V_p."""
     strategies: Sequence[Answer] = ("reorganise", "slow_down", "grasp")
-    """Beside none: legs go to the nearest posture of undisturbed walking, or the walk begins again from the initial
-    velocity, or feet hold on to the ground."""
+    """Strategies beside none: legs go to the nearest posture of undisturbed walking; the walk slows down to the initial
+    velocity and accelerates again; feet adhere to the ground."""
     recovery: float = 0.002
-    """Acceleration a of Eq. 11 after slowing down [1 / time unit]; the paper's is 0.00008."""
+    """Acceleration a of Eq. 11 after slowing down [1 / time unit]; the paper uses 0.00008."""
     initial_velocity: float = Acceleration.start
-    """Velocity V_r(0) to which a walk slows down, as a fraction of V_p."""
+    """Velocity V_r(0) to which the strategy 'slow_down' reduces V_r, as a fraction of V_p."""
     adhesion: float = 1.0
     """Adhesion of a standing foot with the strategy 'grasp', in multiples of the insect's weight."""
     kinematic: bool = False
-    """Leave physics out, and with it pushes and the strategy 'grasp'."""
+    """Compute kinematic walks only, without pushes and the strategy 'grasp', which need the simulated body."""
     observation_time: str | float = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
     n_starts: int = field(default=40, kw_only=True)
-    """Number of random starts that walk stably until they are disturbed, the same in every case."""
+    """Number of random starts whose plan is stable until the disturbance, the same for every case at a velocity."""
 
     hidden: ClassVar[tuple[str, ...]] = ("grasp",)
 
@@ -90,30 +89,30 @@ class DisturbedWalks(Study):
             from hexmj.physics.pushes import can_push
 
             if not can_push(self.conditions, self.stride, time.min()):
-                raise InputError(f"observation_time = {self.observation_time!r}; a push lasts longer")
+                raise InputError(f"observation_time = {self.observation_time!r}; expected longer than a push lasts")
         for name, valid in {"disturbances": get_args(Kind), "strategies": get_args(Answer)}.items():
             values = [choice(name, value, valid) for value in getattr(self, name)]
             distinct(name, ["none", *values])
         if not all(0 < impulse <= MOST_IMPULSE for impulse in self.impulses):
-            raise InputError(f"impulses = {self.impulses}; expected above 0 and up to {MOST_IMPULSE:g} times m V_p")
+            raise InputError(f"impulses = {self.impulses}; expected above 0 and at most {MOST_IMPULSE:g} (in m V_p)")
         distinct("disturbances", [case for case in self.cases if case.disturbance != NO_DISTURBANCE])
         _ = self.grasping, [self._walks(velocity) for velocity in v]
 
     @property
     def grasping(self) -> Conditions:
-        """The conditions of the strategy 'grasp'."""
+        """The conditions of walks with the strategy 'grasp': feet adhere with `adhesion`."""
         return replace(self.conditions, grasp=self.adhesion)
 
     @property
     def back(self) -> Acceleration:
-        """The acceleration after slowing down."""
+        """The acceleration with which the strategy 'slow_down' returns to V_r."""
         return Acceleration(self.recovery, self.initial_velocity)
 
     @property
     def cases(self) -> list[Case]:
-        """The undisturbed walk, then every disturbance without a strategy and with each.
+        """The undisturbed case, then the cases of each disturbance: without a strategy, and with each strategy.
 
-        In kinematic walks, pushes and the strategy 'grasp' are left out.
+        If `kinematic`, there are no pushes and no strategy 'grasp'.
         """
         left_out = PHYSICAL if self.kinematic else ()
         kinds: list[Kind] = [kind for kind in self.disturbances if kind not in left_out]
@@ -126,7 +125,7 @@ class DisturbedWalks(Study):
         ]
 
     def cells(self) -> list[Cell]:
-        """Return a cell for each velocity and case."""
+        """Return a cell for each velocity and case, computed by `StableWalks.times`."""
         grasps = not self.kinematic and "grasp" in self.strategies
         self.check_walks(self.velocities, *([self.grasping] if grasps else []))
         cells = []
@@ -148,12 +147,12 @@ class DisturbedWalks(Study):
         return StableWalks(self.controller, velocity, self.n_starts, self.seed, self.stride)
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return the times of events, and how often they happen.
+        """Return the times of losses and falls, and their frequencies after the disturbance.
 
         Returns:
-            Over (velocity, case, start) the `disturbed_walks.TIMES`; a case has the coordinates `disturbance` and
-            `strategy`, the first is undisturbed. Over velocity the observation time `duration` [time units] and the
-            number of starts `drawn` to find these. And the frequencies of `with_flss_after`.
+            Over (velocity, case, start): the `disturbed_walks.TIMES`. Over case: `disturbance` and `strategy`; the
+            first case is undisturbed. Over velocity: the observation time `duration` [time units] and `drawn`, the
+            number of random starts drawn to find the stable starts. In addition the frequencies of `with_flss_after`.
         """
         table = over_axes({"velocity": len(self.velocities), "case": len(self.cases)}, data).assign_coords(
             **velocity_axis(*self.observed),
@@ -166,14 +165,14 @@ class DisturbedWalks(Study):
 
 
 def with_flss_after(data: "xr.Dataset") -> "xr.Dataset":
-    """Add frequencies over (observation_time, velocity, case) to the times of events.
+    """Add frequencies over (observation_time, velocity, case) to the times of losses and falls.
 
-    Both observation times begin with the disturbance: `whole` ends when the walk has been at its velocity again for
+    Both observation times begin with the disturbance: `whole` ends when the walk has been back at its velocity for
     `duration`, and `short` ends `duration` after the disturbance.
-    `kinematic` is the fraction of starts that lose static stability after the disturbance and within the observation
-    time, of the `kinematic_reached` starts that have not lost it before, with its 95 % Wilson interval.
-    `kinematic_buys` is what the strategy takes off the FLSS of the same disturbance without a strategy, over the starts
-    that reach it in both cases, with its 95 % interval. The same for `physical`, if there is one.
+    `kinematic_reached` is the number of starts that are statically stable until the disturbance. `kinematic` is the
+    fraction of these that lose static stability within the observation time, with its 95 % Wilson interval.
+    `kinematic_buys` is `kinematic` of the same disturbance without a strategy minus `kinematic`, over the starts that
+    reach the disturbance in both cases, with its 95 % interval. Variables of `physical` count falls in the same way.
     """
     dims = ("observation_time", "velocity", "case")
     names = data.disturbance.values.tolist()
@@ -191,17 +190,17 @@ def with_flss_after(data: "xr.Dataset") -> "xr.Dataset":
 
 
 def strategies_in_words(result: "xr.Dataset") -> str:
-    """Return how the strategies of a result slow down and grasp, as a text."""
-    made, words = settings(result), []
-    if "slow_down" in result.strategy.values and "recovery" in made:
-        words.append("slow down to V = {start:g}, then a = {rate:g}".format(**made["recovery"]))
-    if "grasp" in result.strategy.values and "adhesion" in made:
-        words.append(f"grasp {made['adhesion']:g}")
+    """Return a text with the parameters of the strategies 'slow_down' and 'grasp' in a result, if it has them."""
+    recorded, words = settings(result), []
+    if "slow_down" in result.strategy.values and "recovery" in recorded:
+        words.append("slow down to V = {start:g}, then a = {rate:g}".format(**recorded["recovery"]))
+    if "grasp" in result.strategy.values and "adhesion" in recorded:
+        words.append(f"grasp {recorded['adhesion']:g}")
     return "; ".join(words)
 
 
 def disturbed_figure(result: "xr.Dataset") -> "Figure":
-    """Draw a column of panels for each disturbance and a row for each measure, with the observation time `whole`."""
+    """Draw FLSS after the disturbance, within `whole`: a column for each disturbance and a row for each measure."""
     names, strategies = result.disturbance.values, result.strategy.values
     kinds, measures = list(dict.fromkeys(names[names != NO_DISTURBANCE])), [name for name in ROWS if name in result]
     figure = picture(2.6 + 2.5 * len(kinds), 1.6 + 2.5 * len(measures))
@@ -213,7 +212,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
         if row == 0:
             axes.set_title(_title(kind), fontsize=10)
         if measure == "kinematic" and kind.startswith("push"):
-            axes.axis("off")  # a plan does not notice a push
+            axes.axis("off")  # a push does not change the plan
             continue
         for case in np.flatnonzero(names == NO_DISTURBANCE):
             axes.plot(v, data[measure].isel(case=case), **UNDISTURBED, zorder=5)

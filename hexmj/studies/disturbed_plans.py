@@ -1,7 +1,7 @@
-"""Plans that meet a disturbance (paper, Section 6), and the reorganisation of legs, the paper's first strategy.
+"""Plans with a disturbance (paper, Section 6), and the reorganisation of legs, the paper's first strategy.
 
-The legs go to the nearest of a small set of postures of undisturbed walking, with the states of its legs. Positions
-alone do not keep a walk stable.
+Reorganisation moves the legs to the nearest of a few postures of undisturbed walking. The legs also continue with the
+states, swing or stance, of that posture, since tip positions alone do not keep the walk stable.
 """
 
 from dataclasses import dataclass
@@ -26,37 +26,37 @@ from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, copied, joined
 
 Kind = Literal["halt", "leg", "push"]
-"""All legs are halted, one protracting leg is stopped, or the body is pushed, which a plan does not notice."""
+"""Disturbance: all legs halt, one protracting leg is stopped, or the body is pushed, which does not change the plan."""
 
 NEVER = 2**62
-"""Step of an event that has not happened."""
+"""Step number that stands for an event that has not happened yet."""
 
 POSTURES = 36
-"""Postures collected over one period."""
+"""Number of postures collected over one period; unstable postures are then dropped."""
 
 CANDIDATES = 20
-"""Random starts; the first that reaches a stable steady-state gait gives the postures."""
+"""Number of random starts walked to collect postures from the first that reaches a stable steady-state gait."""
 
 PAUSE = 4.0
-"""Time for which a halted body stands [time units]; up to V_p = 200 mm/s it suffices to lower feet in 20 ms."""
+"""Time for which a halted body stands [time units]. Up to V_p = 200 mm/s it exceeds the 20 ms of lowering a foot."""
 
 
 @dataclass(frozen=True, eq=False)
 class Disturbance:
-    """One disturbance of every start."""
+    """One disturbance of the same kind in the walk of every start."""
 
     kind: Kind
     step: np.ndarray
-    """(start,) steps of the plan before the disturbance."""
+    """(start,) number of steps of the plan before the disturbance."""
     leg: np.ndarray
-    """(start,) index of the leg that kind 'leg' stops; if it stands, the next protracting leg is stopped."""
+    """(start,) index of the leg that kind 'leg' stops; if it stands, the leg with the next index that swings."""
 
     def awaited(self, standing: np.ndarray) -> np.ndarray:
-        """Return which starts, (start,), wait for a protracting leg, from the states of the legs, (start, leg)."""
+        """Return whether each start must wait for a swinging leg, (start,), given which legs stand, (start, leg)."""
         return (self.kind == "leg") & np.all(standing, axis=1)
 
     def legs(self, tips: np.ndarray, standing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return tips [mm] and states, both (start, leg), with which every start continues if it is disturbed now."""
+        """Return tips [mm] and whether legs stand, both (start, leg), after a disturbance at this moment."""
         if self.kind == "halt":
             return tips, np.ones_like(standing)
         if self.kind == "leg":
@@ -68,20 +68,20 @@ class Disturbance:
 
 @dataclass(frozen=True, eq=False)
 class Postures:
-    """Postures of undisturbed walking."""
+    """Statically stable postures of undisturbed walking."""
 
     tips: np.ndarray
-    """(posture, leg) [mm]."""
+    """(posture, leg) tip positions [mm]."""
     standing: np.ndarray
-    """(posture, leg) legs that retract."""
+    """(posture, leg) whether each leg is in stance."""
 
     def nearest(self, tips: np.ndarray) -> int:
-        """Return the posture with the least Euclidean distance over the six tips, (leg,) [mm]."""
+        """Return the index of the posture with the lowest Euclidean distance to six tips, (leg,) [mm]."""
         return int(np.argmin(((self.tips - tips) ** 2).sum(axis=1)))
 
 
 def collect_postures(controller: Controller, velocity: float, seed: int, stride: Stride) -> Postures:
-    """Return statically stable postures, evenly spread over one period of a steady-state gait at this velocity.
+    """Return the statically stable among `POSTURES` postures of one period of a steady-state gait at this velocity.
 
     Raises:
         InputError: no start reaches a stable periodic gait.
@@ -89,7 +89,7 @@ def collect_postures(controller: Controller, velocity: float, seed: int, stride:
     gait = steady_state_gait(controller, velocity, n_starts=CANDIDATES, seed=seed, stride=stride)
     stable = gait.periodic & gait.stable
     if not stable.any():
-        raise InputError(f"strategy 'reorganise': no stable periodic gait of {controller.name} at V = {velocity:g}")
+        raise InputError(f"strategy 'reorganise': {controller.name} reaches no stable steady gait at V = {velocity:g}")
     start = int(np.argmax(stable))
     plan = begin(controller, draw_starts(CANDIDATES, seed, stride)[start : start + 1], velocity, stride)
     plan.advance(round(gait.reached[start] / stride.dt))
@@ -100,14 +100,14 @@ def collect_postures(controller: Controller, velocity: float, seed: int, stride:
 
 
 def reorganise(tips: np.ndarray, goal: np.ndarray, stride: Stride) -> tuple[np.ndarray, np.ndarray]:
-    """Return tips [mm] and states, both (step, leg), while one leg after the other moves from its tip to its goal.
+    """Move one leg after the other to its goal; return tips [mm] and whether legs stand, both (step, leg).
 
-    The next leg is the one without which the others support the body best. Legs within one step of their goal stay.
+    The next leg to move is the leg without which the stability margin is widest. Legs within a step of their goal stay.
 
     Args:
-        tips: of the standing legs, (leg,) [mm].
-        goal: where they go at V_p, (leg,) [mm].
-        stride: with the time step and the lines of the tips.
+        tips: tips of the legs, all of which stand, (leg,) [mm].
+        goal: tips to which the legs move at V_p, (leg,) [mm].
+        stride: stride with the time step and the lines of the tips.
     """
     now, left = tips.copy(), [int(leg) for leg in np.flatnonzero(np.abs(goal - tips) > stride.dt)]
     rows, states = [], []
@@ -129,54 +129,54 @@ def reorganise(tips: np.ndarray, goal: np.ndarray, stride: Stride) -> tuple[np.n
 
 @dataclass(frozen=True, eq=False)
 class Disturbed:
-    """A controller with one disturbance of every start, and a strategy against it.
+    """A controller whose plans contain one disturbance of every start, and a strategy against it.
 
-    Without a strategy a halted body stands for `PAUSE`, then the plan starts from there; other walks continue at once.
-    With postures the body is halted too, reorganises its legs and continues from the posture, its states included. If
-    it slows down, it continues with V_r(0), and Eq. 11 brings it back to V. With sensory feedback the leg that is
-    stopped is one that protracts in reality; if none does, the next one that does.
+    Without a strategy, a halted body stands for `PAUSE` and then restarts from its tips; other walks continue at once.
+    With `postures`, the body also halts, moves its legs to a posture, and continues with its tips and leg states. With
+    `slows`, the walk continues at V_r(0) and accelerates to V_r by Eq. 11. With sensory feedback, kind 'leg' stops a
+    leg that swings in the simulation; if all legs stand, the plan waits for a swing.
     """
 
     controller: SteerableController
-    """Plans before and after the disturbance."""
+    """Controller that plans before and after the disturbance."""
     disturbance: Disturbance
-    """Disturbance of the starts at which a plan begins."""
+    """Disturbance of the starts, in the order in which `begin` receives them."""
     postures: Postures | None = None
-    """If given, the legs are reorganised to the nearest of these."""
+    """Postures for the strategy 'reorganise'; None leaves the strategy out."""
     slows: bool = False
-    """Whether the walk slows down to V_r(0) of the acceleration after the disturbance."""
+    """Whether the walk continues at V_r(0) of the acceleration after the disturbance."""
 
     @property
     def name(self) -> str:
-        """Name of the controller, with a remark."""
+        """Name of the inner controller, followed by ', disturbed'."""
         return f"{self.controller.name}, disturbed"
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> "DisturbedPlan":
-        """Return a plan, see `protocol.Controller.begin`."""
+        """Return a disturbed plan; see `protocol.Controller.begin`."""
         arguments = self.controller, starts, velocity, stride, acceleration, threads
         plan = cast(SteerablePlan, begin(*arguments, at_speed=True))
         return DisturbedFeedbackPlan(self, plan) if isinstance(plan, FeedbackPlan) else DisturbedPlan(self, plan)
 
 
 class DisturbedPlan(WrappedPlan):
-    """A `protocol.SteerablePlan` of a `Disturbed` controller."""
+    """A plan with a disturbance, a `protocol.SteerablePlan` that a `Disturbed` controller begins."""
 
     def __init__(self, controller: Disturbed, plan: SteerablePlan) -> None:
-        """Wrap a plan at time 0."""
+        """Wrap a plan that is at time 0."""
         super().__init__(plan)
         self._disturbance, self._postures, self._slows = controller.disturbance, controller.postures, controller.slows
         self._step, self._sensed = self._disturbance.step.copy(), False
         self.restart, self.slow_down = plan.restart, plan.slow_down
         self._stops = self._disturbance.kind == "halt" or self._postures is not None
-        self._rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # tips and states, (step, leg)
+        self._rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # start -> tips and leg states of its rest
         self._tips, self._standing = np.array(self.starts), np.ones(self.starts.shape, dtype=bool)
         self._beside = np.tile(np.array(self.stride.geometry.y, dtype=float), (len(self.starts), 1))
         self._held = self._beside.copy()
         self.resumed = np.full(len(self.starts), NEVER)
-        """(start,) steps before the plan continues, known as soon as the start has been disturbed."""
+        """(start,) step at which the plan continues after the disturbance; `NEVER` until the start is disturbed."""
 
     def advance(self, steps: int) -> PlannedWalk:
-        """Return the next steps; they do not depend on how the walk is divided into calls."""
+        """Return the next steps; two calls give the same steps as one call with the sum of their steps."""
         end, parts = self.done + steps, []
         while self.done < end:
             now = self._step == self.done
@@ -189,22 +189,22 @@ class DisturbedPlan(WrappedPlan):
         return joined(parts)
 
     def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
-        """Continue from these tips [mm] and states, both (start, leg); a resting start keeps to its rest."""
+        """Continue from tips [mm] and leg states, both (start, leg); starts that rest after a halt ignore them."""
         self._plan.see(tips, standing)
         self._sensed = True
 
     @property
     def tips(self) -> np.ndarray:
-        """See `protocol.SteerablePlan`."""
+        """Tips of the inner plan, (start, leg) [mm]."""
         return self._plan.tips
 
     @property
     def standing(self) -> np.ndarray:
-        """See `protocol.SteerablePlan`."""
+        """Whether each leg stands in the inner plan, (start, leg)."""
         return self._plan.standing
 
     def _disturb(self, which: np.ndarray) -> None:
-        """Disturb these starts, (start,): set how long they rest, and the legs with which they continue."""
+        """Disturb starts, mask (start,): set how long each rests, and the tips and states with which it continues."""
         tips, standing = self._disturbance.legs(self._plan.tips, self._plan.standing)
         self._tips[which], self._standing[which], self._held[which] = tips[which], standing[which], self._beside[which]
         self.resumed[which] = self.done
@@ -220,7 +220,7 @@ class DisturbedPlan(WrappedPlan):
             self.resumed[start] += len(way)
 
     def _resume(self, which: np.ndarray) -> None:
-        """Let the plan of these starts, (start,), continue, or begin again after a rest."""
+        """Let the inner plan of starts, mask (start,), continue, or restart if the disturbance made the body rest."""
         if not which.any():
             return
         if self._stops:
@@ -231,7 +231,7 @@ class DisturbedPlan(WrappedPlan):
         self._plan.see(np.where(legs, self._tips, self._plan.tips), np.where(legs, self._standing, self._plan.standing))
 
     def _go_on(self, steps: int) -> PlannedWalk:
-        """Plan steps without an event; the plan of a resting start is replaced by its rest."""
+        """Plan a number of steps in which no start is disturbed or resumes; overwrite the steps of resting starts."""
         before = self.done
         walk = copied(self._plan.advance(steps))
         self.done, self._beside = self.done + steps, walk.y[-1].copy()
@@ -241,15 +241,15 @@ class DisturbedPlan(WrappedPlan):
                 walk.velocity[:, start] = 0.0
                 walk.x[:, start], walk.stance[:, start] = way[rows], stands[rows]
                 walk.y[:, start], walk.height[:, start] = self._held[start], np.nan
-                back = np.diff(way, axis=0, prepend=way[:1]) < 0.0  # the end of such a swing is unknown
+                back = np.diff(way, axis=0, prepend=way[:1]) < 0.0  # a swing to the rear has no AEP
                 walk.aep[:, start] = np.where(back[rows], np.nan, self.stride.aep0)
         return walk
 
 
 class DisturbedFeedbackPlan(DisturbedPlan):
-    """The same for a `protocol.FeedbackPlan`."""
+    """A disturbed plan with sensory feedback, a `protocol.FeedbackPlan`."""
 
     def sense(self, sensed: Sensed) -> None:
-        """Pass on the sensed legs."""
+        """Pass the sensed tips and contacts to the inner plan."""
         self._sensed = True
         self._plan.sense(sensed)

@@ -1,6 +1,6 @@
-"""Walks that are disturbed (paper, Section 6): the disturbances, the starts that meet them, and their times.
+"""Disturbed walks (paper, Section 6): disturbances, the starts that are disturbed, and the times of losses and falls.
 
-An obstacle is "the termination of motion. Then the motion is initiated from new leg positions".
+The paper describes an obstacle as "the termination of motion. Then the motion is initiated from new leg positions".
 """
 
 from dataclasses import dataclass, replace
@@ -25,72 +25,72 @@ if TYPE_CHECKING:
 
 
 Answer = Literal["reorganise", "slow_down", "grasp"]
-"""Strategies: legs go to the nearest posture of undisturbed walking; the velocity is lowered; feet hold the ground."""
+"""Strategies: legs go to the nearest posture of undisturbed walking; the velocity is lowered; feet adhere."""
 
 Strategy = Literal["none"] | Answer
 
 NO_DISTURBANCE = "undisturbed"
-"""Name of the case in which nothing happens."""
+"""Name of the case without a disturbance."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A disturbance and the strategy against it."""
+    """A disturbance, and the strategy with which the insect responds."""
 
     kind: Kind
     strategy: Strategy
     impulse: float = 0.0
-    """Impulse of a push to the left, in multiples of the insect's mass times V_p; 0 is no disturbance."""
+    """Impulse of a push to the left, in multiples of the insect's mass times V_p; with 0 a push is no disturbance."""
 
     @property
     def disturbance(self) -> str:
-        """Name of the disturbance: undisturbed, halt, leg, push 20."""
+        """Name of the disturbance: 'undisturbed', 'halt', 'leg', or 'push' and the impulse, for example 'push 20'."""
         if self.kind != "push":
             return self.kind
         return f"push {float(self.impulse)}".removesuffix(".0") if self.impulse else NO_DISTURBANCE
 
 
 SETTLED = 3
-"""Periods of a single leg for which a start walks; the disturbance comes in the next period."""
+"""Number of periods of a single leg before the period in which the disturbance occurs."""
 
 MOST_DRAWN = 200_000
-"""Most starts that are drawn to find walks that are stable until they are disturbed."""
+"""Maximum number of starts drawn to find starts whose plan is stable until the disturbance."""
 
 GRID = 20
-"""Steps of which every time of a disturbance is a multiple: 25 ms at the default V_p, the duration of a push."""
+"""Disturbances occur at multiples of this number of steps: 25 ms at the default V_p, as long as a push."""
 
 MOST_PERIODS = 3
-"""Most periods of a single leg in which a protracting leg is searched for."""
+"""Maximum number of periods of a single leg for which a disturbance of kind 'leg' waits for a protracting leg."""
 
 
 class TooFewStable(InputError):
-    """Too few starts keep static stability until they are disturbed."""
+    """Raised if too few random starts keep static stability until the disturbance."""
 
 
 @dataclass(frozen=True, eq=False)
 class StableStarts:
-    """Starts whose plan is stable until they are disturbed."""
+    """Random starts whose plan keeps static stability until the disturbance."""
 
     starts: np.ndarray
     """(start, leg) tips at time 0 [mm]."""
     step: np.ndarray
-    """(start,) steps before the disturbance."""
+    """(start,) number of steps before the disturbance."""
     draw: np.ndarray
-    """(start,) in [0, 1[, selects one of the protracting legs."""
+    """(start,) random number in [0, 1) that chooses which of the protracting legs is stopped."""
     drawn: int
-    """Number of starts drawn to find them."""
+    """Number of random starts drawn until enough stable starts were found."""
 
 
 def find_stable_starts(
     controller: Controller, velocity: float, n_starts: int, seed: int, stride: Stride, grid: int
 ) -> StableStarts:
-    """Return the seed's first starts whose plan is stable until the disturbance.
+    """Return the first `n_starts` random starts of a seed whose plan is stable until the disturbance.
 
-    Times of the disturbance are multiples of `grid` steps, and uniform within one period of a single leg, after
-    `SETTLED` of them.
+    The disturbance occurs at a random multiple of `grid` steps, uniform within the period of a single leg that follows
+    the first `SETTLED` periods.
 
     Raises:
-        TooFewStable: fewer than `n_starts` of `MOST_DRAWN` starts are stable for so long.
+        TooFewStable: fewer than `n_starts` of `MOST_DRAWN` starts are stable until the disturbance.
     """
     period, drawn = stride.periods(velocity) / stride.dt, 0
     while drawn < MOST_DRAWN >= n_starts:
@@ -103,17 +103,17 @@ def find_stable_starts(
             found = found[:n_starts]
             return StableStarts(starts[found], step[found], draw[found], int(found[-1]) + 1)
     raise TooFewStable(
-        f"n_starts = {n_starts}; at V = {velocity:g} fewer of {MOST_DRAWN} starts are stable until they are disturbed"
+        f"fewer than n_starts = {n_starts} of {MOST_DRAWN} starts are stable until the disturbance at V = {velocity:g}"
     )
 
 
 def disturbance_of(
     stable: StableStarts, kind: Kind, controller: Controller, velocity: float, stride: Stride
 ) -> Disturbance:
-    """Return the disturbance of these starts; a leg is stopped as soon as one protracts.
+    """Return the disturbance of these starts; kind 'leg' is delayed until a leg protracts.
 
     Raises:
-        InputError: a start has no protracting leg.
+        InputError: no leg of a start protracts within `MOST_PERIODS` periods.
     """
     leg = np.zeros_like(stable.step)
     if kind != "leg":
@@ -138,21 +138,21 @@ TIMES = {
     "planned_loss": "first loss of static stability of the plan, or inf",
     "fall": "first contact of the trunk with the ground, or inf",
 }
-"""Times of every start -> long name; all in time units."""
+"""Variable with a time of every start [time units] -> its long name."""
 
 
 @dataclass(frozen=True)
 class StableWalks:
-    """Walks at one velocity whose plan is stable until they are disturbed."""
+    """Disturbed walks at one velocity, whose plans keep static stability until the disturbance."""
 
     controller: Controller
-    """A `SteerableController`, or `SensoryFeedback` around one."""
+    """Controller that plans the walks: a `SteerableController`, or `SensoryFeedback` around one."""
     velocity: float
-    """V_r, 0 < V < 1."""
+    """V_r as a fraction of V_p, 0 < V < 1."""
     n_starts: int
-    """Number of starts that are stable until their disturbance."""
+    """Number of starts, all of them stable until the disturbance."""
     seed: int
-    """Seed of starts, times, legs and postures."""
+    """Seed of the starts, of the times of disturbances, of the stopped legs and of the postures."""
     stride: Stride
     """Step range, lines of the tips and time step."""
 
@@ -161,20 +161,20 @@ class StableWalks:
 
     @property
     def planner(self) -> SteerableController:
-        """The controller of the kinematic walk, which has no feedback."""
+        """The controller without sensory feedback, which plans the kinematic walks."""
         inner = self.controller.controller if isinstance(self.controller, SensoryFeedback) else self.controller
         return inner  # pyright: ignore[reportReturnType]
 
     @cached_property
     def found(self) -> StableStarts:
-        """The starts; found once for all cases."""
+        """The stable starts, found once for all cases."""
         found = find_stable_starts(self.planner, self.velocity, self.n_starts, self.seed, self.stride, GRID)
         check_repeats(self.planner, found.starts, self.velocity, REPEATED, self.stride)
         return found
 
     @cached_property
     def postures(self) -> Postures:
-        """Postures of the strategy 'reorganise'; collected once for all cases."""
+        """The postures of the strategy 'reorganise', collected once for all cases."""
         return collect_postures(self.planner, self.velocity, self.seed, self.stride)
 
     def times(
@@ -186,19 +186,19 @@ class StableWalks:
         threads: int | None = None,
         which: np.ndarray | None = None,
     ) -> "xr.Dataset":
-        """Return the `TIMES` of every start in one case, and the number of starts `drawn` to find them.
+        """Return the `TIMES` of every start in one case, and the number `drawn` of random starts.
 
         Args:
             case: the disturbance and the strategy.
-            observation_time: time for which all walk after they are at V again [time units].
-            recovery: of the strategy 'slow_down'.
-            conditions: of the physical walk; without them the walk is kinematic.
-            threads: by default one per core.
-            which: indices of some starts, (n,), which walk as long as if all did; by default all.
+            observation_time: duration of all walks after the last start is back at V [time units].
+            recovery: acceleration of the strategy 'slow_down', None for other strategies.
+            conditions: conditions of physical walks; None computes kinematic walks.
+            threads: number of threads, by default one per core.
+            which: indices of the starts that walk, (n,), by default all; the walks last as long as those of all starts.
 
         Raises:
-            TooFewStable: too few starts are stable until they are disturbed.
-            InputError, SimulationError: a walk fails.
+            TooFewStable: too few starts are stable until the disturbance.
+            InputError, SimulationError: a controller is unsuitable, or a walk fails.
         """
         from hexmj.measures.physical import outcomes_of_plan
         from hexmj.physics.pushes import Push

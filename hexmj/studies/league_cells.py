@@ -26,46 +26,46 @@ if TYPE_CHECKING:
     import xarray as xr
 
 IDEAL = "-ideal"
-"""End of the name of an entrant that begins at an ideal start."""
+"""Suffix of the name of an entrant that walks from its ideal start instead of random starts."""
 
 NETWORK = ("uncoordinated", "hws", "ldvs", "own", "own-0.3", "own-0.5", "robust-0.1", "lasting", "lasting-0.3")
-"""Weight sets of the 1998 network that take part."""
+"""Weight sets of the 1998 network that take part in the league."""
 
 EVERYONE = (*NETWORK, *BASELINES, *(f"{name}{IDEAL}" for name in ("wilson", "graham")))
-"""The whole league."""
+"""Names of all entrants of the league."""
 
 FOUR = ("ldvs", "uncoordinated", "wilson", "graham-ideal")
-"""Entrants of a quick look."""
+"""Names of the entrants of a quick league."""
 
 EFFORT = {"work": "mm", "torque": "1", "way": "mm"}
-"""Columns beside the outcomes, and their units."""
+"""Column that `EntrantWalks.outcomes` adds to `Outcomes` -> its unit."""
 
 DISTURBED = {"time": "time unit", "fall": "time unit"}
-"""Columns of disturbed walks, and their units."""
+"""Column of `StableWalks.times` that `EntrantWalks.disturbed` uses -> its unit."""
 
 
 def is_ideal(name: str, controller: Controller) -> bool:
-    """Whether an entrant begins at its `ideal_start(velocity, stride)`, (1, leg) tips [mm], the same for all walks."""
+    """Return whether an entrant always walks from its `ideal_start(velocity, stride)`, tips (1, leg) [mm]."""
     return name.endswith(IDEAL) and hasattr(controller, "ideal_start")
 
 
 def entrants(names: Sequence[str]) -> dict[str, Controller]:
-    """Return controllers by `short_names`, from their names, with the end `IDEAL` for an ideal start.
+    """Load controllers by name, each perhaps with the suffix `IDEAL`, and return them by `short_names`.
 
     Raises:
-        InputError: there is no such controller, or it has no ideal start.
+        InputError: there is no controller of this name, or a controller with the suffix has no ideal start.
     """
     plain = {name: name.removesuffix(IDEAL) for name in names}
     found = {name: load_controller(name) for name in plain.values()}
     short = short_names(found)
     for name, own in plain.items():
         if own != name and not is_ideal(name, found[own]):
-            raise InputError(f"controller = {own} has no ideal_start")
+            raise InputError(f"controller = {name}; {own} has no method ideal_start")
     return {short[own] + IDEAL * (own != name): found[own] for name, own in plain.items()}
 
 
 def short_names(found: Mapping[str, Controller]) -> dict[str, str]:
-    """Return distinct names for tables: known names as they are, others as the loaded controllers call themselves."""
+    """Return name -> distinct name for tables: hexmj's own names as they are, else the controller's `name`."""
     known, short = {*known_names()}, {}
     for name, controller in found.items():
         varied = VARIED.fullmatch(name)
@@ -76,18 +76,18 @@ def short_names(found: Mapping[str, Controller]) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class ControllerStudy(Study):
-    """A study of several controllers: all starts in kinematic walks, the first of them in physics."""
+    """A study of several controllers: all starts in kinematic walks, and the first of them in physical walks too."""
 
     controllers: Mapping[str, Controller]
     """Controllers by their names in the result."""
     velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
     """Velocities V_r as fractions of V_p, 0 < V < 1."""
     physical_starts: int = 100
-    """Number of the starts that walk in physics at every velocity; at most all."""
+    """Number of starts in physical walks at every velocity, the first ones of all starts."""
     periods: int = PERIODS
-    """Cycles of every leg until its steady-state gait is measured."""
+    """Number of cycles that every leg walks until its steady-state gait is measured."""
     n_starts: int = field(default=1000, kw_only=True)
-    """Number of random starts of kinematic walks, the same for all."""
+    """Number of random starts in kinematic walks, the same for every controller and velocity."""
     seed: int = field(default=FRESH, kw_only=True)
     """Seed of the random starts."""
 
@@ -96,15 +96,15 @@ class ControllerStudy(Study):
         whole("physical_starts", self.physical_starts, 1)
         whole("periods", self.periods, CYCLES + 2)
         if not (self.observed[0] > 0).all():
-            raise InputError(f"velocities = {self.velocities}; expected each above 0")
+            raise InputError(f"velocities = {self.velocities}; expected 0 < V < 1")
 
 
 @dataclass(frozen=True)
 class EntrantWalks(WalkSettings):
-    """Walks of an entrant; each method is the function of a cell, and returns columns over start."""
+    """Walks of one entrant. The methods are functions of cells, and return a dataset over start."""
 
     ideal: bool = False
-    """Whether there is one start, see `is_ideal`."""
+    """Whether the entrant walks from its ideal start only, see `is_ideal`."""
 
     @property
     def starts(self) -> np.ndarray:
@@ -114,11 +114,11 @@ class EntrantWalks(WalkSettings):
         controller: Any = self.controller
         start = np.array(controller.ideal_start(self.velocity, self.stride), dtype=float)
         if start.shape != (1, len(LEGS)):
-            raise InputError(f"ideal_start of {self.controller.name} has the shape {start.shape}; expected (1, 6)")
+            raise InputError(f"{self.controller.name}.ideal_start returns the shape {start.shape}; expected (1, 6)")
         return start
 
     def losses(self, threads: int | None = None) -> "xr.Dataset":
-        """Return whether each start loses static stability in its planned walk, `lost`."""
+        """Return `lost`: 1 for each start that loses static stability in its planned walk, else 0."""
         how: Any = {"stride": self.stride, "acceleration": self.acceleration, "threads": threads}
         time = first_loss(self.starts, self.controller, self.velocity, self.duration, **how)
         return over_start({"lost": np.isfinite(time).astype(np.int8)})
@@ -126,18 +126,18 @@ class EntrantWalks(WalkSettings):
     def losses_over_range(
         self, low: float, high: float, observation_time: str | float, threads: int | None = None
     ) -> "xr.Dataset":
-        """Return `lost` with a velocity for each start, uniform from `low` to `high` (Eq. 10)."""
+        """Return `lost` as `losses` does, with a random velocity from `low` to `high` for each start (Eq. 10)."""
         velocity = np.random.default_rng([self.seed, 1]).uniform(low, high, self.n_starts)
         duration = observation_duration(observation_time, velocity, self.stride)
         time = first_loss(self.starts, self.controller, velocity, duration, stride=self.stride, threads=threads)
         return over_start({"lost": np.isfinite(time).astype(np.int8)})
 
     def gaits(self, periods: int, threads: int | None = None) -> "xr.Dataset":
-        """Return the steady-state gait of each start after so many `periods`, see `gaits.steady_state_gait`.
+        """Return the steady-state gait of each start after a number of `periods`, see `gaits.steady_state_gait`.
 
         Returns:
-            `reached`, the time from which on the gait lasts [time units], or inf; whether it is `stable`; and, NaN
-            without a gait, the `duty_factor` and the phases `ipsilateral` and `contralateral`, as circular means.
+            `reached`, the time at which the gait begins [time units], inf if there is none; whether it is statically
+            `stable`; mean `duty_factor` and mean phases `ipsilateral` and `contralateral`, NaN without a gait.
         """
         how: Any = {"seed": self.seed, "stride": self.stride, "periods": periods, "threads": threads}
         gait = steady_state_gait(self.controller, self.velocity, n_starts=self.n_starts, **how)
@@ -154,12 +154,12 @@ class EntrantWalks(WalkSettings):
         """Return the outcome of every physical walk.
 
         Returns:
-            All `Outcomes`, whether the start `fell`, and whether its walk is `missing`; the `work` of the joints over
-            the insect's weight [mm] and the greatest `torque` over its limit, see `EffortSoFar`; the `way` walked ahead
-            [mm]. NaN for walks that fail, see `unless_refused`.
+            All fields of `Outcomes`; `fell`, 1 or 0; the `work` of the joints over the insect's weight [mm] and the
+            greatest `torque` over its limit, see `EffortSoFar`; `way`, the distance walked ahead [mm]; and whether the
+            walk is `missing` since it failed, see `unless_refused`. All other numbers of such a walk are NaN.
 
         Raises:
-            SimulationError: none of the random starts comes to rest.
+            SimulationError: no random start comes to rest.
         """
         from hexmj.measures.physical import physical_outcomes
         from hexmj.physics.outcomes import EffortSoFar, Outcomes
@@ -185,9 +185,9 @@ class EntrantWalks(WalkSettings):
         return found.assign(fell=happened(found.fall), missing=found.fall.isnull())
 
     def disturbed(self, case: Case, threads: int | None = None) -> "xr.Dataset":
-        """Return whether disturbed starts `fell`: 1 or 0.
+        """Return `fell`: 1 for starts that fall after the disturbance, 0 for others.
 
-        NaN if too few starts are stable until the disturbance, the insect fell before it, or the walk fails.
+        NaN for a start that falls before the disturbance or whose walk fails, and for all if too few have stable plans.
         """
         stable = StableWalks(self.controller, self.velocity, self.n_starts, self.seed, self.stride)
         how = case, self.duration, None, self.conditions, threads
@@ -201,14 +201,14 @@ class EntrantWalks(WalkSettings):
 def unless_refused(
     walked: Callable[[np.ndarray], "xr.Dataset"], n_starts: int, columns: Mapping[str, str]
 ) -> "xr.Dataset":
-    """Return the outcomes of all starts, with NaN for walks that fail.
+    """Return the outcomes of all starts over start, with NaN for walks that fail.
 
-    A walk fails if it diverges, its tips are out of reach, or a push still acts at the end of the observation time.
+    A walk fails if its start cannot stand, it diverges, foot targets are out of reach or a push acts at its end.
 
     Args:
-        walked: walks some of the starts, (n,); the outcome of a start must not depend on the others.
+        walked: returns the outcomes of starts, given by index; outcomes of a start must not depend on the other starts.
         n_starts: number of all starts.
-        columns: names of the outcomes, and their units.
+        columns: outcome -> its unit, used if all walks fail.
     """
     import xarray as xr
 

@@ -1,4 +1,4 @@
-"""The league as two figures with a row for each entrant: losses and falls, and gaits, trials and costs."""
+"""Two figures of the league with a row for each entrant: losses and falls; and trials, gaits and costs."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,36 +15,36 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
 
 COLUMNS = 4
-"""Panels of a figure."""
+"""Number of panels in a figure."""
 
 SHARE: dict[str, Any] = {"vmin": 0.0, "vmax": 1.0}
-"""Ends of the colours of shares and phases."""
+"""Options of the colour scale of fractions and phases: from 0 to 1."""
 
 BAR: dict[str, Any] = {"format": "%g", "fraction": 0.03}
-"""Options of a colour bar."""
+"""Options of all colour bars."""
 
 NOTES = f"{FEWER} of fewer starts: walks are missing that diverged or were out of reach; {NOTHING} not known"
-"""Explanation of the marks."""
+"""Explanation of the marks in the cells of the heat maps."""
 
 POINTS = {"range": ("#1b6ca8", "o", -0.14), "accelerated": ("#b3261e", "D", 0.14)}
-"""Number over all velocities -> colour, mark and place in its row."""
+"""FLSS that is not given per velocity -> colour, marker, and vertical shift of its point in the entrant's row."""
 
 
 class Panel(NamedTuple):
-    """A heat map."""
+    """A heat map with a row for each entrant."""
 
     title: str
     values: np.ndarray
-    """(entrant, column)."""
+    """(entrant, column) numbers shown as colours."""
     colours: str
-    """Name of a colour map of matplotlib."""
+    """Name of one of matplotlib's colour maps."""
     fewer: np.ndarray | bool = False
-    """Where walks are missing, (entrant, column), if any are."""
+    """(entrant, column) whether walks are missing; False if none is missing in any cell."""
     ends: dict[str, Any] = SHARE
 
 
 def league_figure(result: "xr.Dataset") -> "Figure":
-    """Draw kinematic and measured losses and falls, the best in physics at the top."""
+    """Draw kinematic losses, measured losses and falls, with the lowest physical FLSS at the top."""
     shown = by_rank(result)
     missing = shown.missing.values > 0
     titles = dict(zip(MEASURES, ("kinematic losses", "measured losses", "falls (physical)"), strict=True))
@@ -60,7 +60,7 @@ def league_figure(result: "xr.Dataset") -> "Figure":
 
 
 def walks_figure(result: "xr.Dataset") -> "Figure":
-    """Draw falls in trials, steady-state gaits and costs, the best in physics at the top."""
+    """Draw falls in trials, steady-state gaits and costs, with the lowest physical FLSS at the top."""
     shown = by_rank(result)
     few, missing = shown.fell_starts.values, shown.missing.values > 0
     some_are = (few > 0) & (few < few.max())
@@ -82,7 +82,7 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
 
 
 def _drawn(heading: str, shown: "xr.Dataset", panels: list[Panel], note: str) -> "tuple[Figure, Any, list[AxesImage]]":
-    """Return a figure with a row for each entrant, its axes, and the heat maps in the first ones."""
+    """Draw panels in a figure of `COLUMNS` axes with a row for each entrant; return figure, axes and heat maps."""
     rows, images = shown.sizes["entrant"], []
     figure = picture(11.0, 2.6 + 0.22 * rows)
     axes = figure.subplots(1, COLUMNS, sharey=True)
@@ -101,7 +101,7 @@ def _drawn(heading: str, shown: "xr.Dataset", panels: list[Panel], note: str) ->
 
 
 def _dots(axes: "Axes", shown: "xr.Dataset") -> None:
-    """Draw J_N and the FLSS of accelerating walks with their intervals."""
+    """Draw J_N and the FLSS of accelerating walks with their 95 % intervals."""
     for name, (colour, marker, beside) in POINTS.items():
         middle, ends = interval(shown, name)
         style: dict[str, Any] = {"color": colour, "fmt": marker, "markersize": 4, "capsize": 2.0}

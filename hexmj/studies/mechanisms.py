@@ -1,10 +1,10 @@
 """Why an insect falls, or does not fall although its plan loses static stability: one named mechanism for every start.
 
-A planned loss begins when the plan's margin, seen from the body's own centre of mass, is no longer positive. It is over
-when three conditions hold: the plan is stable again, the centre of mass is above the polygon of the measured feet, and
-the trunk has tilted by less than `TIPPED` for the time constant of an inverted pendulum of the standing height,
-sqrt(h / g). A fall begins as the trunk tips that has last been upright for so long. Its mechanism follows from the lean
-of the trunk since twice that time before, and from the plan's margin since once that time before.
+The time constant T = sqrt(h / g) is that of an inverted pendulum of the standing height h. A planned loss begins when
+the plan's margin around the body's own centre of mass is no longer positive. It ends when the plan is stable again, the
+centre of mass is above the polygon of the measured feet, and the trunk has tilted by less than `TIPPED` for a time T. A
+fall begins at the end of the last time T in which the trunk tilted by less than `TIPPED`. Its mechanism follows from
+the lean of the trunk from 2 T before its begin on, and from the plan's minimum margin from T before until its begin.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hexmj.measures.physical import PhysicalWalk
 
 TIPPED = 0.05
-"""Tilt of the trunk beyond which it has tipped [rad]; a walking trunk tilts by 0.01, one that falls by 0.16."""
+"""Tilt above which the trunk has tipped [rad]; a trunk tilts by 0.01 rad in a walk and by 0.16 rad in a fall."""
 
 MECHANISMS = {
     "never_lost": "no planned loss and no fall",
@@ -35,14 +35,14 @@ MECHANISMS = {
     "unplanned": "fell although the margin of the plan was wide",
     "narrow": "fell although the plan did not lose stability: its margin was narrow",
 }
-"""Mechanism -> its definition. If a start survives several losses, the last of the names that apply counts."""
+"""Mechanism -> its definition. A start that survives several planned losses gets the last mechanism in this order."""
 
 NARROW = 0.1
-"""Margin of the plan that is narrow, as a share of the standing height: feet that are lifted push the trunk, and legs
-that yield move its centre of mass. Measured: 0 to 0.09."""
+"""Maximum margin of the plan that counts as narrow, as a fraction of the standing height. Falls with a positive margin
+were observed at 0 to 0.09, since lifting feet push the trunk and yielding legs shift its centre of mass."""
 
 SAVED = ("still_standing", "too_short", "landed_in_time", "caught")
-"""Mechanisms of the starts with a planned loss that did not fall."""
+"""Mechanisms of starts with a planned loss but no fall."""
 
 _NUMBER = {name: number for number, name in enumerate(MECHANISMS)}
 
@@ -50,7 +50,7 @@ _NUMBER = {name: number for number, name in enumerate(MECHANISMS)}
 def mechanisms(walk: "PhysicalWalk") -> np.ndarray:
     """Return the mechanism of each start as an index in `MECHANISMS`, (start,).
 
-    A loss that the end of the observation time cuts short counts as survived.
+    A planned loss that has not ended at the end of the observation time counts as survived.
     """
     fell, known = np.isfinite(walk.outcomes.fall), np.isfinite(walk.qpos[..., 0]).sum(axis=0)
     kept, outside = walk_margin(static_plan(walk)), walk_margin(walk.measured) <= 0.0
@@ -76,20 +76,20 @@ def mechanisms(walk: "PhysicalWalk") -> np.ndarray:
 
 
 def fall_direction(walk: "PhysicalWalk") -> np.ndarray:
-    """Return the direction of each fall, from straight ahead to the left, (start,) [rad]; NaN without a fall."""
+    """Return the direction of each fall, (start,) [rad]: 0 is ahead, pi/2 to the left; NaN without a fall."""
     last = np.maximum(np.isfinite(walk.qpos[..., 0]).sum(axis=0) - 1, 0)
     ahead, left = np.moveaxis(lean(walk.qpos[..., 3:7])[0][last, np.arange(len(last))], -1, 0)
     return np.where(np.isfinite(walk.outcomes.fall), np.arctan2(left, ahead), np.nan)
 
 
 def static_plan(walk: "PhysicalWalk") -> Walk:
-    """Return the planned walk, seen from the body's own centre of mass in the home posture."""
+    """Return the planned walk with tips relative to the body's own centre of mass in the home posture, not to O."""
     return replace(walk.planned, x=walk.planned.x - walk.conditions.centre_of_mass)
 
 
 def _fall(tipping: np.ndarray, last: np.ndarray, least: float, narrow: float) -> int:
-    """Return the mechanism of a fall, from the lean of the tipped trunk, (step, 2), its `last` lean, (2,), the least
-    margin of the plan within the time constant before, and the margin that is narrow [mm]."""
+    """Return the mechanism of a fall, from the lean (ahead, left) of the tipped trunk, (step, 2), its `last` lean,
+    (2,), the `least` margin of the plan before the fall, and the maximum margin that counts as `narrow` [mm]."""
     if (tipping @ last < 0.0).any():
         return _NUMBER["thrown"]
     if least > 0.0:
@@ -98,7 +98,7 @@ def _fall(tipping: np.ndarray, last: np.ndarray, least: float, narrow: float) ->
 
 
 def _rescue(exposed: np.ndarray, caught: np.ndarray) -> int:
-    """Return the mechanism of a survived loss, from the tilt while the centre of mass was outside, (step,)."""
+    """Return the mechanism of a survived loss; `exposed` is the tilt while the centre of mass is outside, (step,)."""
     if caught.any():
         return _NUMBER["caught"]
     if not exposed.size:
@@ -107,7 +107,7 @@ def _rescue(exposed: np.ndarray, caught: np.ndarray) -> int:
 
 
 def _losses(lost: np.ndarray, recovered: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Yield the begin and the end of each planned loss, from one start's steps, both (step,)."""
+    """Yield first step and end of each planned loss of a start, from masks (step,): plan unstable, body recovered."""
     begin = 0
     while lost[begin:].any():
         begin += int(np.argmax(lost[begin:]))
@@ -118,7 +118,7 @@ def _losses(lost: np.ndarray, recovered: np.ndarray) -> Iterator[tuple[int, int]
 
 
 def _time_constant(walk: "PhysicalWalk") -> int:
-    """Return the time constant of an inverted pendulum of the standing height, sqrt(h / g), in steps of the plan."""
+    """Return sqrt(h / g), the time constant of an inverted pendulum of the standing height h, in steps of the plan."""
     from hexmj.bodies.mjcf import gravity
 
     seconds = np.sqrt(walk.conditions.standing_height / gravity(walk.conditions.body))
@@ -126,15 +126,15 @@ def _time_constant(walk: "PhysicalWalk") -> int:
 
 
 def _long_upright(upright: np.ndarray, steps: int) -> np.ndarray:
-    """Return whether the trunk has been upright for so many steps, (step, start)."""
+    """Return whether the trunk has been `upright`, (step, start), in each of the last `steps` steps, (step, start)."""
     tipped = np.concatenate([np.zeros((steps, upright.shape[1]), dtype=int), np.cumsum(~upright, axis=0)])
     return tipped[steps:] == tipped[:-steps]
 
 
 def _caught(walk: "PhysicalWalk") -> np.ndarray:
-    """Return where a foot that the plan holds in the air stands after it had left the ground, (step, start, leg).
+    """Return whether a foot has lifted off and is back on the ground while the plan swings it, (step, start, leg).
 
-    A foot that is lowered to its AEP lands instead; without an AEP in the plan no foot is lowered.
+    False while the plan lowers the foot close to its AEP; a plan without AEPs lowers no foot.
     """
     stance, stands = walk.planned.stance, walk.measured.stance
     landing = walk.conditions.landing_distance

@@ -1,4 +1,4 @@
-"""The last strides of walks that have found their gait, and what is measured of them, one number for each quantity."""
+"""Quantities of gait, forces, torques, posture and work, measured in the last whole strides of physical walks."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from hexmj.physics.settle import Settled
 
 SEGMENTS = ("front", "middle", "hind")
-"""Pairs of legs from front to rear."""
+"""Names of the pairs of legs, from front to rear."""
 
 JOINTS = ("thorax-coxa", "coxa-trochanter", "femur-tibia")
-"""Joints of a leg with three, from the body outwards."""
+"""Names of the joints of a leg with three joints, from the body outwards."""
 
 WHOLE = {
     "speed": "mm/s",
@@ -44,10 +44,10 @@ WHOLE = {
     "positive work of the joints": "J/kg/m",
     "work on the centre of mass": "J/kg/m",
 }
-"""Quantities of the whole body, and their units."""
+"""Quantity of the whole body -> its unit."""
 
 PHASES = "phase, ipsilateral", "phase, contralateral"
-"""Quantities on the circle [0, 1)."""
+"""Quantities that are circular, in [0, 1)."""
 
 EACH = {
     "vertical impulse": "% W",
@@ -59,62 +59,62 @@ EACH = {
     "coxa-trochanter torque past half its peak, until": "% of stance",
     "height of the coxae": "mm",
 }
-"""Quantities of each pair of legs, and their units; impulses are of both legs together."""
+"""Quantity of each pair of legs -> its unit (W is the body weight); impulses are sums over both legs."""
 
 UNITS = WHOLE | {f"{name}, {segment}": unit for name, unit in EACH.items() for segment in SEGMENTS}
-"""All quantities, and their units."""
+"""Quantity of the whole body or of one pair of legs -> its unit."""
 
 FRAME = 0.04
-"""Time over which speed, height and pitch are averaged, as in a film of 25 frames a second [s]."""
+"""Averaging time of speed, height and pitch, as in a film of 25 frames per second [s]."""
 
 PLATE = 0.01
-"""Time over which forces are averaged, as by a force plate [s]."""
+"""Averaging time of forces and torques, as of a force plate [s]."""
 
 HOP = 0.12
-"""A foot swings if it is off the ground for more than this part of the time from PEP_0 to AEP_0."""
+"""Minimum duration of a swing, as a fraction of the time that a protraction from PEP_0 to AEP_0 takes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Strides:
-    """Whole strides of one start, from one lift-off of leg 1 to another; row t is a physics step."""
+    """Whole strides of one start, from one lift-off of leg 1 to a later one; each row is a physics step."""
 
     settled: "Settled"
-    """The start at rest."""
+    """All starts at rest, with the compiled body."""
     count: int
     """Number of strides."""
     qpos: np.ndarray
-    """(row, position) before each step."""
+    """(row, position) MuJoCo's `qpos` before each physics step."""
     velocity: np.ndarray
-    """(row, 3) of the root [mm/s]."""
+    """(row, 3) mean velocity of the root during the previous physics step, in the world [mm/s]."""
     turning: np.ndarray
-    """(row, joint) velocities of the joints over the step that ends there [rad/s]."""
+    """(row, joint) mean angular velocity of each joint during the previous physics step [rad/s]."""
     torques: np.ndarray
-    """(row, joint) torques of the servos over that step, damping included [g mm^2/s^2]."""
+    """(row, joint) mean torque of each servo, damping included, during the previous physics step [g mm^2/s^2]."""
     standing: np.ndarray
-    """(row, leg) feet in contact."""
+    """(row, leg) whether each foot is in contact with the ground."""
     centre: np.ndarray
-    """(row, 3) centre of mass in the world [mm]."""
+    """(row, 3) position of the centre of mass in the world [mm]."""
     ground: np.ndarray
-    """(sample, leg, 3) forces of the ground on the feet, in the world, once per step of the plan [g mm/s^2]."""
+    """(sample, leg, 3) force of the ground on each foot, in the world, once per step of the plan [g mm/s^2]."""
 
     @property
     def step(self) -> float:
-        """Physics step [s]."""
+        """Duration of a physics step [s]."""
         return self.settled.compiled.model.opt.timestep
 
     def averaged(self, values: np.ndarray, time: float, every: int = 1) -> np.ndarray:
-        """Return moving means of values, (n,), in every so many rows, over a time [s]."""
+        """Return moving means over a time [s] of values, (n,), of which there is one in `every` rows."""
         width = max(1, round(time / self.step / every))
         return np.convolve(values, np.ones(width) / width, "valid")
 
     def lifted(self, leg: int) -> np.ndarray:
-        """Return the rows in which a leg begins to swing, if the strides repeat."""
+        """Return the rows in which a leg begins to swing; the first stride is taken to follow the last one again."""
         rows = len(self.standing)
         found = onsets(np.tile(self.standing[:, leg], 3), rows_of_a_hop(self.settled))
         return found[(found >= rows) & (found < 2 * rows)] - rows
 
     def stances(self, leg: int) -> list[np.ndarray]:
-        """Return the rows of each stance of a leg, from landing to swing; the strides follow each other in a ring."""
+        """Return the rows of each stance of a leg; the first stride is taken to follow the last one again."""
         standing, rows, lifted = self.standing[:, leg], len(self.standing), self.lifted(leg)
         strides = [np.arange(a, b) % rows for a, b in pairwise([*lifted, *(lifted[:1] + rows)])]
         return [stride[standing[stride].argmax() :] for stride in strides]
@@ -123,13 +123,13 @@ class Strides:
 def last_strides(
     settled: "Settled", walks: WalkSettings, measured: float, threads: int | None = None
 ) -> Iterator[tuple[int, Strides]]:
-    """Yield each start that does not fall with its whole strides in the last part of the walk.
+    """Walk, and yield the index of each start that does not fall with its whole strides at the end of the walk.
 
     Args:
         settled: starts at rest, with sensors of the feet's forces.
-        walks: controller, velocity and duration.
-        measured: last part of the duration [time units].
-        threads: by default one per core.
+        walks: settings of the walks.
+        measured: duration of the end of the walk from which strides are taken [time units].
+        threads: number of threads, by default one per core.
     """
     from hexmj.physics.rollout import drive
 
@@ -139,15 +139,15 @@ def last_strides(
     for start in chunks[-1].ids[~chunks[-1].fell] if chunks else ():
         standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
         begun = onsets(standing, rows_of_a_hop(settled))
-        begun = begun[begun > 1]  # not the strides that begin from rest
+        begun = begun[begun > 1]  # drop strides that begin at rest
         if len(begun) > 1:
             yield int(start), strides_between(settled, chunks, start, begun)
 
 
 def strides_between(settled: "Settled", chunks: "Sequence[Chunk]", start: int, begun: np.ndarray) -> Strides:
-    """Return the strides of one start between rows in which leg 1 lifts off, `begun`, of consecutive chunks.
+    """Return the strides of one start between `begun`, the rows of consecutive chunks in which leg 1 lifts off.
 
-    There are at least two such rows, none among the first two.
+    `begun` has at least two rows, none of which is 0 or 1.
     """
     columns, rows = settled.compiled.columns, slice(begun[0], begun[-1])
     qpos, sensors, torque, standing = (
@@ -170,13 +170,13 @@ def strides_between(settled: "Settled", chunks: "Sequence[Chunk]", start: int, b
 
 
 def rows_of_a_hop(settled: "Settled") -> float:
-    """Return the number of physics steps off the ground beyond which a foot swings, see `HOP`."""
+    """Return the minimum duration of a swing, see `HOP`, in physics steps."""
     stride, step = settled.stride, settled.compiled.model.opt.timestep
     return HOP * (stride.aep0 - stride.pep0) / settled.conditions.vp / step
 
 
 def onsets(standing: np.ndarray, hop: float) -> np.ndarray:
-    """Return the rows in which a foot, (row,), leaves the ground for longer than a hop."""
+    """Return the rows in which a foot leaves the ground for more than `hop` rows, given whether it stands, (row,)."""
     changes = np.flatnonzero(standing[1:] != standing[:-1]) + 1
     lifted = changes[~standing[changes]]
     landed = np.append(changes[standing[changes]], len(standing))
@@ -184,12 +184,12 @@ def onsets(standing: np.ndarray, hop: float) -> np.ndarray:
 
 
 def quantity_table(walks: WalkSettings, measured: float, threads: int | None = None) -> "xr.Dataset":
-    """Return every quantity of every start, over (quantity, start): a cell of the study. NaN where a start fell.
+    """Compute a cell of the study: `value` over (quantity, start), NaN for a start that falls or has no whole stride.
 
     Args:
         walks: settings of the walks.
-        measured: last part of the walks that counts [time units].
-        threads: by default one per core.
+        measured: duration of the end of the walk from which strides are taken [time units].
+        threads: number of threads, by default one per core.
     """
     import xarray as xr
 
@@ -203,7 +203,7 @@ def quantity_table(walks: WalkSettings, measured: float, threads: int | None = N
 
 
 def quantities(strides: Strides) -> dict[str, float]:
-    """Return every quantity by name; NaN without the joints for it, or for a leg that never carries."""
+    """Return the value of every quantity in `UNITS`; NaN if the body lacks the joints or a leg never carries weight."""
     parts = (_gait, _forces, _torques, _posture, _work)
     values = {name: value for part in parts for name, value in part(strides).items()}
     for name in EACH.keys() & values.keys():
@@ -230,7 +230,7 @@ def _gait(strides: Strides) -> dict[str, Any]:
 
 
 def _forces(strides: Strides) -> dict[str, Any]:
-    """Return the forces of the ground on the feet, along the body's heading."""
+    """Return the quantities of the forces of the ground on the feet, in the directions of the body's heading."""
     share = strides.ground / strides.settled.compiled.weight
     level = turned(share[..., :2], -heading(strides.qpos[:: strides.settled.substeps, 3:7]))
     ahead, inward, up = level[..., 0], -np.array(SIDE) * level[..., 1], share[..., 2]
@@ -245,12 +245,12 @@ def _forces(strides: Strides) -> dict[str, Any]:
 
 
 def _torques(strides: Strides) -> dict[str, Any]:
-    """Return the torques of the servos while their leg stands, and the work that they do then."""
+    """Return torque and work of the servos of standing legs; nothing for a body whose legs do not have three joints."""
     torque = strides.torques.reshape(len(strides.torques), 6, -1)
     if torque.shape[2] != len(JOINTS):
         return {}
     power, stands = torque * strides.turning.reshape(torque.shape), strides.standing[..., None]
-    with np.errstate(invalid="ignore"):  # of a leg that never stands
+    with np.errstate(invalid="ignore"):  # a leg that never stands gives 0 / 0
         mean = np.abs(torque).sum(axis=0, where=stands) / stands.sum(axis=0)
     against = ((power < 0) & stands).sum(axis=(0, 1)) / strides.standing.sum()
     work = (np.maximum(power, 0.0) * stands).sum(axis=(0, 1))
@@ -266,9 +266,9 @@ def _torques(strides: Strides) -> dict[str, Any]:
 
 
 def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
-    """Return a leg's torque, (row,), at each percent of its stance, (101,), averaged over stances; NaN without one.
+    """Return a leg's torque, (row,), at each percent of a stance, (101,), averaged over stances; NaN without stances.
 
-    The torque is positive where it carries the body.
+    The sign is chosen so that the mean torque over the stance is positive.
     """
     around = np.pad(torque, n := round(PLATE / strides.step), mode="wrap")
     seen = np.convolve(around, np.ones(n) / n, "same")[n:-n]
@@ -279,7 +279,7 @@ def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
 
 
 def _posture(strides: Strides) -> dict[str, Any]:
-    """Return heights of the coxae over the ground, and the pitch of the line from hind to front coxae."""
+    """Return the heights of coxae and centre of mass, and the pitch of the line from hind to front coxae."""
     from hexmj.bodies.ground import ground_level
     from hexmj.bodies.kinematics import joint_numbers, posed
 
@@ -300,8 +300,7 @@ def _posture(strides: Strides) -> dict[str, Any]:
 
 
 def _work(strides: Strides) -> dict[str, Any]:
-    """Return work over the insect's own weight and way; negative work of a joint is lost, and costs nothing or as much
-    as positive work."""
+    """Return work per own weight (without load) and distance; only 'all work' adds joints' negative work, as a cost."""
     power, compiled = strides.torques * strides.turning, strides.settled.compiled
     gravity = compiled.weight / compiled.body.mass
     rate = compiled.weight * _ahead(strides).mean()
@@ -319,5 +318,5 @@ def _work(strides: Strides) -> dict[str, Any]:
 
 
 def _ahead(strides: Strides) -> np.ndarray:
-    """Return the speed of the root along its heading, (row,) [mm/s]."""
+    """Return the speed of the root in the direction of its heading, (row,) [mm/s]."""
     return turned(strides.velocity[:, None, :2], -heading(strides.qpos[:, 3:7]))[:, 0, 0]

@@ -1,4 +1,4 @@
-"""Dynamic stability maps: physical FLSS over the velocity and one condition, with the same starts in every cell."""
+"""Dynamic stability maps: physical FLSS over velocity and one condition, from the same starts in every cell."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ Over = Literal["vp", "step_height", "standing_height", "friction", "load", "cent
 
 
 class Axis(NamedTuple):
-    """A condition that a map can vary."""
+    """Default values, unit and name of a condition that a map can vary."""
 
     values: tuple[float, ...]
     unit: str
@@ -49,11 +49,11 @@ CONDITIONS: dict[Over, Axis] = {
 """Condition -> its default values, unit and name; the animal's own centre of mass lies at -9.4 mm."""
 
 FLSS = MEASURES | BESIDE | {"static": "static_loss"}
-"""Measure -> the outcome whose frequency it is. `static` is the planned polygon around the body's own centre of mass;
-`kinematic` is the same around O, which depends on no condition."""
+"""Measure -> outcome, the time of the event that it counts. `static` counts losses of the planned polygon around the
+body's own centre of mass; `kinematic` counts those around O, which are the same under all conditions."""
 
 BLOCK = 100
-"""Starts walked at a time: their walks are kept whole, 0.5 GB at V = 0.1."""
+"""Number of starts walked at a time; all steps of their walks are in memory, 0.5 GB at V = 0.1."""
 
 LOOKS: dict[str, tuple[str, str | None]] = {
     "never_lost": ("#e4e4e4", None),
@@ -67,30 +67,30 @@ LOOKS: dict[str, tuple[str, str | None]] = {
     "unplanned": ("#6a4c93", ".."),
     "narrow": ("#b79bd6", "--"),
 }
-"""Mechanism -> colour and hatch: grey for no event, green for saved starts, warm for falls after a planned loss, violet
-for other falls; falls are hatched, for readers without colours."""
+"""Mechanism -> colour and hatch: grey without loss and fall, green for a survived loss, red to yellow for a fall after
+a planned loss, violet for another fall. Falls are hatched, for readers without colours."""
 
 
 @dataclass(frozen=True)
 class StabilityMap(Study):
-    """The same starts at every value of one condition and every velocity.
+    """Physical walks from the same starts at every value of one condition and every velocity.
 
-    The controller must not read the legs, since mechanisms are derived from the plan alone. Starts are left out of the
-    result if they cannot stand on six feet at every value, or do not reach nine of ten tips in every cell.
+    The controller must not use sensory feedback, since mechanisms are derived from the plan alone. The result contains
+    the starts that stand on six feet at every value and reach nine of ten foot targets in every cell.
     """
 
     controller: Controller
-    """Controller that plans the walks; it must not read the legs."""
+    """Controller that plans the walks, without sensory feedback."""
     over: Over = "vp"
-    """The condition that is varied."""
+    """Condition that is varied."""
     values: Sequence[float] = ()
-    """Values of that condition in its unit; five usual ones by default."""
+    """Values of the varied condition in its unit; by default five values that depend on the condition."""
     velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
-    """Velocities V_r as fractions of V_p, 0 <= V < 1; when accelerating, the final ones."""
+    """Velocities V_r as fractions of V_p, 0 <= V < 1; the final velocities when accelerating."""
     observation_time: str | float = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
     acceleration: Acceleration | None = None
-    """The accelerating procedure of Eq. 11."""
+    """The accelerating procedure of Eq. 11; without it the velocity is constant."""
 
     def __post_init__(self) -> None:
         choice("over", self.over, CONDITIONS)
@@ -99,25 +99,25 @@ class StabilityMap(Study):
         _ = self.varied
         start, v = draw_starts(1, self.seed, self.stride), self.observed[0][:1]
         if isinstance(begin(self.controller, start, v, self.stride, self.acceleration, threads=1), FeedbackPlan):
-            raise InputError(f"controller = {self.controller.name} reads the legs; a map needs one that does not")
+            raise InputError(f"controller = {self.controller.name}; expected a controller without sensory feedback")
 
     @property
     def set_by_study(self) -> tuple[str, ...]:
-        """The condition that is varied."""
+        """The name of the varied condition, in a tuple."""
         return (self.over,)
 
     @property
     def chosen(self) -> list[float]:
-        """Values of the condition."""
+        """The values of the varied condition: `values`, or the default values."""
         return [float(value) for value in self.values or CONDITIONS[self.over].values]
 
     @property
     def varied(self) -> list[Conditions]:
-        """The conditions at each value."""
+        """The conditions of walks at each value of the varied condition."""
         return [replace(self.conditions, **{self.over: value}) for value in self.chosen]
 
     def cells(self) -> list[Cell]:
-        """Return a cell for each value and velocity."""
+        """Return a cell for each value and velocity, computed by `fates`."""
         self.check_walks(self.velocities, *self.varied)
         cells = []
         for value, conditions in zip(self.chosen, self.varied, strict=True):
@@ -128,27 +128,27 @@ class StabilityMap(Study):
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return outcomes, frequencies, and the differences that dynamics and the condition make.
+        """Return outcomes, frequencies, and differences between measures and between values of the condition.
 
         Returns:
-            Over (value, velocity): the frequencies `FLSS`, and `saved`, the fraction of the starts with a static loss
-            that do not fall, with 95 % Wilson intervals; the paired differences `dynamics`, physical less static, and
-            `change`, physical less physical at the value `attrs["reference"]`, with 95 % intervals; the Froude number
-            `froude`. Over mechanism_name too: the number of starts, `count`. Over (value, velocity, start): every field
-            of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad]. Over value: the number
-            of starts that `stand` and reach nine of ten tips at every velocity.
+            Over (value, velocity): the frequencies `FLSS`, and `saved`, the fraction of starts with a static loss that
+            do not fall, with 95 % Wilson intervals; the differences `dynamics`, physical minus static FLSS, and
+            `change`, physical FLSS minus that at the value `attrs["reference"]`, on the same starts, with 95 %
+            intervals; the Froude number `froude`. Over (value, velocity, mechanism_name): `count` of starts. Over
+            (value, velocity, start): `static_loss`, `mechanism` (index), `direction` of the fall [rad] and every field
+            of `Outcomes`. Over value: `stand`, the number of starts that stand and reach the targets at each velocity.
 
         Raises:
-            InputError: no start is left.
+            InputError: no start stands and reaches its foot targets in every cell.
         """
         sizes, axis = {"value": len(self.chosen), "velocity": len(self.velocities)}, CONDITIONS[self.over]
         table = over_axes(sizes, data, join="inner", combine_attrs="override")
         if not table.sizes["start"]:
-            raise InputError(f"{self.over} = {self.chosen}; no start stands and reaches its tips at all of them")
+            raise InputError(f"{self.over} = {self.chosen}; no start stands and reaches its foot targets at all values")
         left, columns = [set(cell.start.values.tolist()) for cell in data], sizes["velocity"]
         stand = [len(set.intersection(*left[i : i + columns])) for i in range(0, len(left), columns)]
-        usual = Conditions().values()[self.over]
-        reference = usual if usual in self.chosen else self.chosen[0]
+        default = Conditions().values()[self.over]
+        reference = default if default in self.chosen else self.chosen[0]
         numbers = np.stack([froude(conditions, self.observed[0]) for conditions in self.varied])
         table = table.assign_coords(
             **velocity_axis(*self.observed),
@@ -162,15 +162,15 @@ class StabilityMap(Study):
 
 
 def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dataset":
-    """Return what happens to every start in one cell of a map over a condition.
+    """Return loss, fall and mechanism of every start in one cell of a map over the condition `over`.
 
-    Starts that cannot stand on six feet, or do not reach nine of ten tips, are left out.
+    Starts that cannot stand on six feet, or reach less than nine of ten foot targets, are left out.
 
     Returns:
         Over start: every field of `Outcomes`, `static_loss`, `mechanism` (index) and `direction` of the fall [rad].
 
     Raises:
-        InputError, SimulationError: no start is left, or a walk diverges.
+        InputError, SimulationError: all starts are left out, or a walk diverges.
     """
     stands = standing_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
     blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
@@ -183,7 +183,7 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
     parts = [part for block in blocks for part in by_halves(block, fate)]
     if not parts:
         value = walks.conditions.values()[over]
-        raise InputError(f"{over} = {value:g}; no start stands and reaches its tips at V = {walks.velocity:g}")
+        raise InputError(f"{over} = {value:g}; no start stands and reaches its foot targets at V = {walks.velocity:g}")
     columns = {name: np.concatenate([part[name] for _, part in parts]) for name in parts[0][1]}
     within = np.concatenate([which for which, _ in parts])
     return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(
@@ -192,7 +192,7 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
 
 
 def with_differences(data: "xr.Dataset", reference: float) -> "xr.Dataset":
-    """Add the frequencies, differences and counts of `StabilityMap.result` to the outcomes of its cells."""
+    """Add the frequencies, differences and counts that `StabilityMap.result` describes to the outcomes of its cells."""
     cells = ("value", "velocity")
     events = {name: happened(data[outcome]).transpose(*cells, "start").values for name, outcome in FLSS.items()}
     fell, static = events["physical"], events["static"]
@@ -215,7 +215,9 @@ def froude(conditions: Conditions, velocity: np.ndarray) -> np.ndarray:
 
 
 def map_figure(result: "xr.Dataset") -> "Figure":
-    """Draw two heat maps: physical FLSS above the kinematic one, and the static losses that dynamics saves."""
+    """Draw two heat maps over velocity and condition: physical FLSS, and the fraction of static losses without a fall.
+
+    The lowest row shows the kinematic FLSS, which is the same under all conditions."""
     result = result.transpose("value", "velocity", "start", ...)
     rows, columns = result.sizes["value"], result.sizes["velocity"]
     figure = picture(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.62 * (rows + 1))
@@ -245,7 +247,7 @@ def map_figure(result: "xr.Dataset") -> "Figure":
 
 
 def mechanisms_figure(result: "xr.Dataset") -> "Figure":
-    """Draw what happened to every start as stacked bars, a panel for each velocity."""
+    """Draw the fraction of starts with each mechanism as stacked bars over the condition, a panel for each velocity."""
     columns, values = result.sizes["velocity"], range(result.sizes["value"])
     figure = picture(max(8.0, 2.6 + 2.3 * columns), 4.6)
     panels = figure.subplots(1, columns, sharey=True, squeeze=False)[0]

@@ -1,4 +1,4 @@
-"""Standings of the league: frequencies with their intervals, differences, ranks, and the tables of all that."""
+"""Standings of the league: frequencies with their intervals, differences and ranks, as a dataset and as tables."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,64 +17,64 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LEGS_LOST = {f"lost {leg + 1}": leg for leg in (0, 1, 2)}
-"""Trial -> index of the leg that is lost: front, middle, hind."""
+"""Trial in which a leg is lost -> index of the leg: front, middle or hind."""
 
 READING: tuple[str, ...] = ("reads", "noise", "late")
-"""Trials with sensory feedback: exact, inexact, late."""
+"""Trials with sensory feedback: exact, noisy, delayed."""
 
 TRIALS = ("halt", "leg", "push", "step", "rough", "load", *LEGS_LOST, *READING)
-"""Names of all trials."""
+"""Names of all trials of the league."""
 
 ABOUT_TRIALS = (
-    "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, of walks that are stable until"
-    " then; step, rough: ground of 0.3 of the body's standing height; load: twice the weight; lost: one leg;"
-    " reads: sensory feedback; noise, late: with errors of 10 % of the step range, 20 ms late; -: the plan cannot be"
-    " steered or has no feedback, the walk is too short, or no walk is left"
+    "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, in walks with stable plans until"
+    " then; step, rough: ground of 0.3 of the body's standing height; load: twice the weight; lost: without one leg;"
+    " reads: sensory feedback; noise: with errors of 10 % of the step range; late: delayed by 20 ms; -: the plan cannot"
+    " be steered or has no feedback, the walk is too short, or no walk is left"
 )
-"""Explanation of the trials."""
+"""Explanation of the trials, printed above their table."""
 
 OVER_VELOCITY = ("entrant", "velocity")
 
 UNITS = {"slip": "mm/s", "reached": "time unit"}
-"""Units of variables that are no frequency, rank, phase or ratio."""
+"""Variable of the standings -> its unit; the other variables are plain numbers."""
 
-ASKED = ("lost", "fell", "reached", "stable", "duty_factor", "ipsilateral", "contralateral")
-"""Variables of cells that an entrant may not have."""
+OPTIONAL = ("lost", "fell", "reached", "stable", "duty_factor", "ipsilateral", "contralateral")
+"""Variables of cells that some entrants do not have; they become NaN."""
 
 REFERENCE = "ldvs"
-"""Entrant that others are compared with; if it does not take part, the first one from random starts."""
+"""Entrant to which all others are compared; if it does not take part, the first entrant with random starts is used."""
 
 
 def standings(
     entrants: Mapping[str, Controller], velocities: np.ndarray, data: Mapping[tuple[str, str], "xr.Dataset"]
 ) -> "xr.Dataset":
-    """Return the results of all cells of entrants at velocities V_r, (velocity,), as one dataset.
+    """Return the results of all cells of the league as one dataset.
 
     Args:
         entrants: controllers by name.
-        velocities: (velocity,).
+        velocities: velocities V_r, (velocity,).
         data: result of every cell by entrant and question.
 
     Returns:
-        Over (entrant, velocity): `kinematic`, `measured` and `physical` FLSS with `_low`, `_high` (95 % Wilson), and
-        how far they are above those of the `reference` on the same starts, `_above`, with its interval; of walks
-        without a fall the `speed` over that commanded, `slip` [mm/s], `cost` of transport, and the greatest `torque`
-        of a joint over its limit; the number of `missing` walks, which failed; of steady-state gaits the share
-        that is `periodic` and `stable`, the median `reached` [time units], `duty_factor` and the phases `ipsilateral`
-        and `contralateral`.
-        Over entrant: `range`, J_N, and `accelerated`, with intervals; over (entrant, measure) the `best` and `worst`
-        rank, by the mean over velocities.  Over (entrant, trial): `fell`, and kinematic `lost`, with intervals.
-        All frequencies have the number of their `_starts`.
+        Over (entrant, velocity): `kinematic`, `measured` and `physical` FLSS with `_low`, `_high` (95 % Wilson); with
+        `_above`, the FLSS minus that of the `reference` on the same starts, and its 95 % interval. For walks without a
+        fall: actual over commanded `speed`, `slip` [mm/s], `cost` of transport, highest `torque` of a joint over its
+        limit. The number of walks that failed, `missing`. For steady-state gaits: the fractions of starts that are
+        `periodic` and `stable`, the median time until it is `reached` [time units], `duty_factor` and the phases
+        `ipsilateral` and `contralateral`.
+        Over entrant: `range`, J_N, and `accelerated`, with intervals. Over (entrant, measure): `best` and `worst`
+        rank by the mean over velocities. Over (entrant, trial): `fell`, and kinematic `lost`, with intervals.
+        The number of starts behind a frequency has the suffix `_starts`.
     """
     import xarray as xr
 
-    names, nothing = list(entrants), xr.Dataset(dict.fromkeys(ASKED, ("start", [])))
+    names, nothing = list(entrants), xr.Dataset(dict.fromkeys(OPTIONAL, ("start", [])))
 
     def cells(questions: Iterable[str], axis: str = "velocity") -> "xr.Dataset":
-        """Return what cells hold, over (entrant, question, start); NaN for a missing cell."""
-        asked = list(questions)
-        found = [data.get((name, question), nothing) for name in names for question in asked]
-        return over_cells({"entrant": len(names), axis: len(asked)}, found)
+        """Return the results of cells over (entrant, question, start); the second axis is named `axis`."""
+        listed = list(questions)
+        found = [data.get((name, question), nothing) for name in names for question in listed]
+        return over_cells({"entrant": len(names), axis: len(listed)}, found)
 
     planned, walked, gaits = (
         cells(f"{kind} {v}" for v in velocities.tolist()) for kind in ("kinematic", "physics", "gait")
@@ -86,7 +86,7 @@ def standings(
     table: dict[str, Any] = {}
     places = []
     for measure, values in events.items():
-        same = np.where(ideal[:, None, None], np.nan, values)  # on the same random starts
+        same = np.where(ideal[:, None, None], np.nan, values)  # ideal starts cannot be compared pairwise
         table |= frequencies(measure, values.values, OVER_VELOCITY)
         table |= differences(f"{measure}_above", same, same[names.index(reference or names[0])], OVER_VELOCITY)
         places.append(ranks(same.mean(axis=1)))
@@ -120,13 +120,13 @@ def standings(
 
 
 def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the best and the worst rank that each may have, (entrant,), from 1 on.
+    """Return the best and the worst possible rank of each entrant, both (entrant,); rank 1 is the best.
 
     Args:
-        values: of the same starts, (entrant, start), less is better; the rank of an entrant that is NaN is 0.
+        values: scores on the same starts, (entrant, start), lower is better; an entrant with NaN only gets rank 0.
 
     Returns:
-        1 plus the number that is significantly better; the number ranked less the number that is significantly worse.
+        Best rank: 1 + number of significantly better entrants. Worst: number of ranked minus significantly worse ones.
     """
     ranked = np.isfinite(values).any(axis=1)
     best, worst = np.zeros(len(values), dtype=int), np.zeros(len(values), dtype=int)
@@ -137,24 +137,24 @@ def ranks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _phase(values: np.ndarray) -> float:
-    """Return the circular mean of known phases, (start,)."""
+    """Return the circular mean of the finite phases among values, (start,); NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(circular_mean(known)) if len(known) else np.nan
 
 
 LESS, MORE = "-", "+"
-"""Beside a frequency that is significantly below, or above, that of the reference."""
+"""Marks of a frequency that is significantly below or above that of the reference."""
 
 WEDGED = 5.0
-"""Torque about the coxa-femur joint of a cockroach's hind leg that wedges into a crevice, over weight times length of
-the leg: its muscles pull with over 50 times the weight at a tenth of the leg's arm (Full & Ahn 1995, J. exp. Biol. 198,
-1285, abstract). No figure for a stick insect was found."""
+"""Peak torque of a cockroach that wedges into a crevice, about the coxa-femur joint of a hind leg, over body weight
+times leg length: muscle forces above 50 body weights act at a tenth of the leg's length (Full & Ahn 1995, J. exp. Biol.
+198, 1285, abstract). No value for a stick insect was found."""
 
 MEASURES = {"kinematic": "Kinematic FLSS", "measured": "Measured FLSS", "physical": "Physical FLSS"}
 
 
 class Table(NamedTuple):
-    """One table."""
+    """A table of texts with its title and column headings."""
 
     title: str
     head: tuple[str, ...]
@@ -162,50 +162,50 @@ class Table(NamedTuple):
 
 
 def tables(result: "xr.Dataset") -> list[Table]:
-    """Return all tables of a league."""
+    """Return all tables of a league's standings, entrants from best to worst."""
     shown = by_rank(result)
     over_velocity = [_over_velocity(shown, measure, title) for measure, title in MEASURES.items()]
     at = shown.sel(velocity=shown.attrs["trial_velocity"], method="nearest")
-    return [_ranks(shown), *over_velocity, _regimes(at), _trials(shown), _costs(at)]
+    return [_ranks(shown), *over_velocity, _gaits(at), _trials(shown), _costs(at)]
 
 
 def league_markdown(result: "xr.Dataset") -> str:
-    """Return all tables as Markdown."""
-    parts = [f"### {one.title}\n\n" + "\n".join(markdown_table(one.head, one.rows)) for one in tables(result)]
+    """Return all tables of a league's standings as Markdown."""
+    parts = [f"### {table.title}\n\n" + "\n".join(markdown_table(table.head, table.rows)) for table in tables(result)]
     return "\n\n".join(parts) + "\n"
 
 
 def by_rank(result: "xr.Dataset") -> "xr.Dataset":
-    """Sort entrants from best to worst, by physical, then by kinematic FLSS; those from ideal starts come last."""
+    """Sort entrants by mean physical FLSS, then by mean kinematic FLSS; entrants with ideal starts come last."""
     falls, losses = (result[measure].mean("velocity").values for measure in ("physical", "kinematic"))
     unranked = result.best.sel(measure="physical").values == 0
     return result.isel(entrant=np.lexsort((losses, falls, unranked))).transpose("entrant", ...)
 
 
 def from_one(result: "xr.Dataset") -> str:
-    """Return which entrants walk from their ideal start alone, as a text; empty if all or none do."""
+    """Return the names of the entrants that walk from one ideal start, as a text; empty if all entrants or none do."""
     alone = (result.kinematic_starts == 1).all("velocity").values
     return f"{', '.join(result.entrant.values[alone])} from one start" if alone.any() and not alone.all() else ""
 
 
-def frequency(one: "xr.Dataset", name: str) -> str:
-    """Return a frequency with its interval; "-" if it is unknown."""
-    middle, low, high = (_short(one[name + end].item()) for end in ("", "_low", "_high"))
+def frequency(cell: "xr.Dataset", name: str) -> str:
+    """Return the text of a scalar frequency with its interval, such as ".52 (.39-.64)"; "-" if it is NaN."""
+    middle, low, high = (_short(cell[name + end].item()) for end in ("", "_low", "_high"))
     return "-" if middle == "nan" else f"{middle} ({low}-{high})"
 
 
 def _rows(shown: "xr.Dataset", row: Callable[["xr.Dataset"], Iterable[str]]) -> list[tuple[str, ...]]:
-    """Return a row for each entrant, with its name first."""
+    """Return a row of texts for each entrant: its name, and the texts that the function `row` returns for its data."""
     return [(name, *row(shown.sel(entrant=name))) for name in shown.entrant.values]
 
 
 def _ranks(shown: "xr.Dataset") -> Table:
     controllers = settings(shown)["controllers"]
 
-    def row(one: "xr.Dataset") -> Iterable[str]:
-        means = (_known(f"{one[measure].mean(skipna=False).item():.3f}") for measure in MEASURES)
-        places = (mean + place(one.sel(measure=measure)) for measure, mean in zip(MEASURES, means, strict=True))
-        return *places, frequency(one, "range"), frequency(one, "accelerated")
+    def row(entrant: "xr.Dataset") -> Iterable[str]:
+        means = (_known(f"{entrant[measure].mean(skipna=False).item():.3f}") for measure in MEASURES)
+        places = (mean + place(entrant.sel(measure=measure)) for measure, mean in zip(MEASURES, means, strict=True))
+        return *places, frequency(entrant, "range"), frequency(entrant, "accelerated")
 
     rows = []
     for (name, *cells), missing in zip(_rows(shown, row), shown.missing.sum("velocity"), strict=True):
@@ -216,20 +216,20 @@ def _ranks(shown: "xr.Dataset") -> Table:
     return Table(title, ("controller", *MEASURES, "J_N, 0.1 to 0.5", "accelerated to 0.9"), rows)
 
 
-def place(one: "xr.Dataset") -> str:
-    """Return a rank in brackets: '(2)', '(=3-6)'; empty without a rank."""
-    best, worst = one.best.item(), one.worst.item()
+def place(cell: "xr.Dataset") -> str:
+    """Return the text of a rank in brackets, such as ' (2)', or ' (=3-6)' for a tie; empty without a rank."""
+    best, worst = cell.best.item(), cell.worst.item()
     return "" if best == 0 else f" ({best})" if best == worst else f" (={best}-{worst})"
 
 
 def _over_velocity(shown: "xr.Dataset", measure: str, title: str) -> Table:
-    def cell(one: "xr.Dataset") -> str:
-        fewer = measure != "kinematic" and one.missing.item()
-        below, above = one[f"{measure}_above_high"].item() < 0, one[f"{measure}_above_low"].item() > 0
-        left = f" of {one[f'{measure}_starts'].item()}" if fewer else ""
-        return frequency(one, measure) + left + (f" {LESS}" if below else f" {MORE}" if above else "")
+    def text(cell: "xr.Dataset") -> str:
+        fewer = measure != "kinematic" and cell.missing.item()
+        below, above = cell[f"{measure}_above_high"].item() < 0, cell[f"{measure}_above_low"].item() > 0
+        left = f" of {cell[f'{measure}_starts'].item()}" if fewer else ""
+        return frequency(cell, measure) + left + (f" {LESS}" if below else f" {MORE}" if above else "")
 
-    rows = _rows(shown, lambda one: [cell(one.isel(velocity=i)) for i in range(shown.sizes["velocity"])])
+    rows = _rows(shown, lambda entrant: [text(entrant.isel(velocity=i)) for i in range(shown.sizes["velocity"])])
     reference, starts = shown.attrs["reference"], shown[f"{measure}_starts"].max().item()
     title += f" of {starts_in_words(starts)}"
     title += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
@@ -237,11 +237,11 @@ def _over_velocity(shown: "xr.Dataset", measure: str, title: str) -> Table:
     return Table(title, ("controller", *(f"V = {v:g}" for v in shown.velocity.values)), rows)
 
 
-def _regimes(at: "xr.Dataset") -> Table:
-    def row(one: "xr.Dataset") -> Iterable[str]:
-        shares = (f"{one[key].item():.2f}" for key in ("periodic", "stable"))
-        phases = (f"{one[key].round(2).item() % 1.0:.2f}" for key in ("ipsilateral", "contralateral"))
-        return map(_known, (*shares, f"{one.reached.item():.0f}", *phases, f"{one.duty_factor.item():.2f}"))
+def _gaits(at: "xr.Dataset") -> Table:
+    def row(entrant: "xr.Dataset") -> Iterable[str]:
+        shares = (f"{entrant[key].item():.2f}" for key in ("periodic", "stable"))
+        phases = (f"{entrant[key].round(2).item() % 1.0:.2f}" for key in ("ipsilateral", "contralateral"))
+        return map(_known, (*shares, f"{entrant.reached.item():.0f}", *phases, f"{entrant.duty_factor.item():.2f}"))
 
     head = ("controller", "periodic", "statically stable", "reached after", "ipsilateral", "contralateral", "duty")
     title = f"Steady-state gaits at V = {at.velocity.item():g}: shares, median time, phases, duty factor"
@@ -251,10 +251,10 @@ def _regimes(at: "xr.Dataset") -> Table:
 def _trials(shown: "xr.Dataset") -> Table:
     most = shown.fell_starts.max().item()
 
-    def row(one: "xr.Dataset") -> Iterable[str]:
-        for share, starts in zip(one.fell.values, one.fell_starts.values, strict=True):
+    def row(entrant: "xr.Dataset") -> Iterable[str]:
+        for share, starts in zip(entrant.fell.values, entrant.fell_starts.values, strict=True):
             yield _known(f"{share:.2f}") + (f" of {starts}" if 0 < starts < most else "")
-        yield _known(f"{one.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")
+        yield _known(f"{entrant.lost.sel(trial=list(LEGS_LOST)).mean().item():.2f}")
 
     v = shown.attrs["trial_velocity"]
     title = f"Falls at V = {v:g} in {starts_in_words(most)}; kinematic: losses, mean of three lost legs. {ABOUT_TRIALS}"
@@ -262,20 +262,20 @@ def _trials(shown: "xr.Dataset") -> Table:
 
 
 def _costs(at: "xr.Dataset") -> Table:
-    def row(one: "xr.Dataset") -> Iterable[str]:
-        costs = (f"{one[key].item():.3g}" for key in ("speed", "slip", "cost", "torque"))
-        return map(_known, (*costs, f"{one.torque.item() / WEDGED:.2f}"))
+    def row(entrant: "xr.Dataset") -> Iterable[str]:
+        costs = (f"{entrant[key].item():.3g}" for key in ("speed", "slip", "cost", "torque"))
+        return map(_known, (*costs, f"{entrant.torque.item() / WEDGED:.2f}"))
 
     head = ("controller", "speed kept", "slip [mm/s]", "cost of transport", "peak torque", "of a cockroach's")
     return Table(f"Walks without a fall at V = {at.velocity.item():g}", head, _rows(at, row))
 
 
 def _short(value: float) -> str:
-    """Return two digits after the point, three below 0.1, without a leading zero."""
+    """Return a number with two digits after the point, or up to three below 0.1, and without a leading zero."""
     text = f"{value:.2f}" if value >= 0.1 else f"{value:.3f}".rstrip("0").rstrip(".")
     return text.replace("0.", ".", 1)
 
 
 def _known(text: str) -> str:
-    """Return the text of a number, "-" for NaN."""
+    """Return the text of a number unchanged, except "-" for "nan" and "never" for "inf"."""
     return {"nan": "-", "inf": "never"}.get(text, text)

@@ -1,11 +1,11 @@
-"""The static limit: as V_p goes to zero, does the walking insect tend to the plan and to the paper's static criterion?
+"""The static limit: does physical walking converge to the plan and to the paper's static criterion as V_p goes to zero?
 
-The same starts walk at smaller and smaller V_p, with the insect's own legs and with legs of next to no mass, as the
-paper has them.
+The same starts walk at decreasing V_p, with the mass of the insect's own legs and with legs of almost no mass, as in
+the paper, whose legs have none.
 
-The ground can carry a body with more than three standing feet in many ways. Which feet carry depends on how far the
-servos yield: a standing foot may hover by a fiftieth of the standing height while others carry. It supports the body
-nevertheless, since it carries as soon as the trunk sinks by as much.
+If more than three feet stand, the distribution of the weight over them depends on how far the servos yield. A foot in
+stance may hover by a fiftieth of the standing height while other feet carry the weight. The hovering foot still
+supports the body, since it touches the ground as soon as the trunk sinks by that height.
 """
 
 from collections.abc import Sequence
@@ -35,32 +35,32 @@ if TYPE_CHECKING:
     from hexmj.measures.physical import PhysicalWalk
 
 GROUNDED = 0.05
-"""Height below which a foot is at the ground, as a fraction of the standing height; 0.05 to 0.2 give the same FLSS at
-V_p = 20 mm/s within 0.04 (`docs/static_limit.md`)."""
+"""Height, as a fraction of the standing height, up to which a foot counts as standing in `grounded`. Values from 0.05
+to 0.2 change FLSS at V_p = 20 mm/s by at most 0.04 (`docs/static_limit.md`)."""
 
 LOSSES = {"kinematic": "planned_loss", "measured": "measured_loss", "grounded": "grounded_loss", "physical": "fall"}
-"""Measure of FLSS -> the outcome whose frequency it is: `compare.MEASURES`, and `grounded`, the measured one with all
-feet at the ground, see `grounded`."""
+"""Measure of FLSS -> outcome, the time of the event that it counts: the measures `compare.MEASURES`, and `grounded`,
+which is `measured` with low-hovering feet counted as standing, see `grounded`."""
 
 DISTANCES = {
     "margin": ("mm", "mean distance between measured and planned stability margin"),
-    "margin_grounded": ("mm", "the same with all feet at the ground"),
-    "margin_pressure": ("mm", "the same for the margin of the centre of pressure"),
-    "margin_same_feet": ("mm", "the same for the measured margin while the planned feet stand"),
+    "margin_grounded": ("mm", "mean distance between margin of all feet at the ground and planned margin"),
+    "margin_pressure": ("mm", "mean distance between margin of the centre of pressure and planned margin"),
+    "margin_same_feet": ("mm", "mean distance between measured and planned margin while the planned feet stand"),
     "same_feet": ("1", "fraction of steps in which the planned feet stand"),
-    "same_feet_grounded": ("1", "the same with all feet at the ground"),
+    "same_feet_grounded": ("1", "fraction of steps in which the planned feet are the feet at the ground"),
     "drift": ("mm", "mean distance of the centre of mass from O"),
 }
-"""Distance of a measured walk from its plan, until the plan loses stability or the insect falls -> unit, long name."""
+"""Distance of a measured walk from its plan -> unit, long name. Walks count until the plan's loss or the fall."""
 
 REPORTED = {"slip": "mm/s", "tracking": "mm"}
-"""Other outcomes in the result, and their units."""
+"""Field of `Outcomes` that the result contains too -> its unit."""
 
 FINE = Conditions(longest_substep=0.5)
-"""Light legs need physics steps of 0.5 ms or less."""
+"""Default conditions: light legs need physics steps of at most 0.5 ms."""
 
 LINES = ("-", "--", ":", "-.")
-"""Lines for the masses of the legs in turn."""
+"""Line styles of the masses of the legs, in this order."""
 
 STYLES: dict[str, dict[str, Any]] = {
     "measured": {"color": "#e08e1b", "marker": "s"},
@@ -70,7 +70,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "measured, same feet stand": {"color": "#6a4c93", "marker": "o"},
     "": {"color": "#1b6ca8", "marker": "o"},
 }
-"""Name in a legend -> style."""
+"""Label of a curve in a legend -> its style."""
 
 PANELS = {
     "FLSS": {"measured": "measured", "grounded": "grounded", "physical": "physical"},
@@ -87,28 +87,28 @@ PANELS = {
     },
     "centre of mass from O [mm]": {"drift": ""},
 }
-"""Label of a panel's axis -> its variables with their names in the legend."""
+"""Label of a panel's axis -> the variables drawn in the panel, with their labels in the legend."""
 
 ABOVE = LEGEND | {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "fontsize": 8, "ncols": 2}
-"""Places a legend above its panel."""
+"""Options that place a legend above its panel."""
 
 
 @dataclass(frozen=True)
 class StaticLimit(Study):
-    """The same starts at every V_p, with every mass of the legs."""
+    """Physical walks from the same starts at every V_p and with every mass of the legs."""
 
     controller: Controller
     """Controller that plans the walks."""
     velocity: float = 0.5
-    """Velocity V_r as a fraction of V_p, 0 <= V < 1; when accelerating, the final one."""
+    """Velocity V_r as a fraction of V_p, 0 <= V < 1; the final velocity when accelerating."""
     vps: Sequence[float] = (400.0, 200.0, 100.0, 50.0, 25.0)
     """Velocities V_p of a protracting tip [mm/s]."""
     leg_masses: Sequence[float] = (1.0, 0.01)
-    """Masses of the legs as fractions of the insect's own; the paper's legs have none."""
+    """Masses of the legs as fractions of the mass of the insect's own legs; the legs of the paper have no mass."""
     observation_time: str | float = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
     acceleration: Acceleration | None = None
-    """The accelerating procedure of Eq. 11."""
+    """The accelerating procedure of Eq. 11; without it the velocity is constant."""
     n_starts: int = field(default=200, kw_only=True)
     conditions: Conditions = field(default=FINE, kw_only=True)
 
@@ -122,11 +122,11 @@ class StaticLimit(Study):
 
     @property
     def varied(self) -> list[Conditions]:
-        """The conditions at each mass of the legs and V_p."""
+        """The conditions of walks with each mass of the legs at each V_p."""
         return [replace(self.conditions, leg_mass=mass, vp=vp) for mass, vp in product(self.leg_masses, self.vps)]
 
     def cells(self) -> list[Cell]:
-        """Return a cell for each mass of the legs and V_p."""
+        """Return a cell for each mass of the legs and V_p, computed by `distance_table`."""
         self.check_walks([self.velocity], *self.varied)
         cells = []
         for conditions in self.varied:
@@ -136,12 +136,12 @@ class StaticLimit(Study):
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return FLSS, agreement and distances from the plan.
+        """Return FLSS, agreement between the measures, and distances from the plan.
 
         Returns:
             Over (leg_mass, vp): the FLSS of `LOSSES` with 95 % Wilson intervals; `agreement`, the fraction of starts
-            for which the kinematic and the physical answer are the same, `agreement_measured` and
-            `agreement_grounded`, the same for those answers. Over (leg_mass, vp, start): the outcomes behind them,
+            with a planned loss and a fall, or with neither; `agreement_measured` and `agreement_grounded`, the same for
+            these losses instead of the fall. Over (leg_mass, vp, start): the times of the losses and falls,
             `DISTANCES` and `REPORTED`.
         """
         mass = {"units": "1", "long_name": "mass of the legs over the insect's own"}
@@ -158,7 +158,7 @@ class StaticLimit(Study):
 
 
 def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Dataset":
-    """Return the outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start: a cell of the study."""
+    """Compute a cell of the study: the outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start."""
     walk = kept_walk(walks, walks.starts, threads)
     outcomes = vars(walk.outcomes) | {"grounded_loss": loss_time(grounded(walk), threads=threads)}
     units = dict.fromkeys(LOSSES.values(), "time unit") | REPORTED
@@ -169,22 +169,22 @@ def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Datas
 
 
 def distances(walk: "PhysicalWalk") -> dict[str, np.ndarray]:
-    """Return `DISTANCES` of every start, (start,); NaN where the plan is lost at once.
+    """Return the `DISTANCES` of every start, (start,); NaN if the plan is unstable from the first step on.
 
-    If the controller reads the legs, the distance is that from the plan that it commands.
+    With sensory feedback, the distances are measured from the plan that the legs followed.
     """
     plan, measured, near = walk.ordered, walk.measured, grounded(walk)
     compared = plan.time[:, None] < np.minimum(loss_time(plan), walk.outcomes.fall)
-    wanted, pressure = walk_margin(plan), pressure_margin(walk)
+    planned, pressure = walk_margin(plan), pressure_margin(walk)
     same, same_near = ((feet.stance == plan.stance).all(axis=-1) for feet in (measured, near))
     drift = np.linalg.norm(walk.centre_of_mass[..., :2] - walk.qpos[..., :2], axis=-1)
     touching = compared & measured.stance.any(axis=-1)  # there is no margin without a foot
     with np.errstate(invalid="ignore"):
-        off, off_grounded = (np.abs(walk_margin(feet) - wanted) for feet in (measured, near))
+        off, off_grounded = (np.abs(walk_margin(feet) - planned) for feet in (measured, near))
         steps = {  # values, and the steps that count, both (step, start)
             "margin": (off, touching),
             "margin_grounded": (off_grounded, touching),
-            "margin_pressure": (np.abs(pressure - wanted), compared & np.isfinite(pressure)),
+            "margin_pressure": (np.abs(pressure - planned), compared & np.isfinite(pressure)),
             "margin_same_feet": (off, touching & same),
             "same_feet": (same, compared),
             "same_feet_grounded": (same_near, compared),
@@ -197,15 +197,15 @@ def distances(walk: "PhysicalWalk") -> dict[str, np.ndarray]:
 
 
 def grounded(walk: "PhysicalWalk", share: float = GROUNDED) -> Walk:
-    """Return the measured walk with the feet that hover by less than a share of the standing height standing too."""
+    """Return the measured walk, counting feet that hover below `share` standing heights as standing."""
     near = walk.height <= share * walk.conditions.standing_height
     return replace(walk.measured, stance=walk.measured.stance | near)
 
 
 def centre_of_pressure(walk: "PhysicalWalk") -> np.ndarray:
-    """Return the centre of the forces that push feet up, seen from the centre of mass, (step, start, 2) [mm].
+    """Return the centre of pressure of the feet relative to the centre of mass, (step, start, 2) [mm].
 
-    A foot that adhesion holds down does not count. NaN where the ground pushes no foot up.
+    Feet that adhesion pulls down are left out. NaN where the ground pushes no foot up.
     """
     pushed = np.maximum(walk.load, 0.0)
     with np.errstate(invalid="ignore"):
@@ -216,8 +216,8 @@ def centre_of_pressure(walk: "PhysicalWalk") -> np.ndarray:
 def pressure_margin(walk: "PhysicalWalk") -> np.ndarray:
     """Return the distance of the centre of pressure from the nearest edge of the support polygon, (step, start) [mm].
 
-    The polygon is that of all feet at the ground. The centre of pressure never lies outside, and lies on the edge over
-    which the body tips. NaN where the ground pushes no foot up.
+    The polygon is that of all feet at the ground, see `grounded`. The centre of pressure is never outside, and when the
+    body tips over an edge, it is on that edge. NaN where the ground pushes no foot up.
     """
     support, centre = grounded(walk), centre_of_pressure(walk)
     known = np.isfinite(centre[..., 0])
@@ -226,7 +226,7 @@ def pressure_margin(walk: "PhysicalWalk") -> np.ndarray:
 
 
 def static_limit_figure(result: "xr.Dataset") -> "Figure":
-    """Draw four panels against V_p, with a kind of line for each mass of the legs."""
+    """Draw FLSS, agreement, margins and drift against V_p, with a line style for each mass of the legs."""
     from matplotlib.lines import Line2D
 
     figure = picture(9.6, 7.6)

@@ -1,7 +1,7 @@
-"""Obstacles in physics: how often the insect falls once it has reached a step, gap, hurdle or rough ground.
+"""Terrain: the frequency of falls in physical walks that have reached a step, gap, hurdle or rough ground.
 
-The same starts walk on flat ground and towards every obstacle, and do the same until a foot reaches it. The commanded
-distance takes the hindmost foot one stride beyond the longest obstacle.
+The same starts walk on flat ground and towards every obstacle; the walks are identical until a foot reaches the
+obstacle. The commanded distance takes the hindmost foot a step length beyond the longest obstacle.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ObstacleKind = Literal["step", "gap", "hurdle", "rough"]
-"""Kinds of ground that are not flat, see `Conditions.ground`."""
+"""Kind of ground other than 'flat', see `Conditions.ground`."""
 
 OUTCOMES = {
     "fall": "first contact of the trunk with the ground, or inf",
@@ -35,10 +35,10 @@ OUTCOMES = {
     "tilt": "greatest tilt of the trunk",
     "speed": "distance walked ahead over distance commanded, until the fall",
 }
-"""Field of `physics.outcomes.Outcomes` in the result -> long name."""
+"""Field of `physics.outcomes.Outcomes` that the result contains -> its long name."""
 
 FARTHER = Conditions(ground_at=80.0)
-"""Default conditions: walks have found their gait before they reach an obstacle."""
+"""Default conditions: obstacles begin at 80 mm, so that walks reach their steady-state gait before an obstacle."""
 
 SIZES = {
     "step": "height of the step [mm]",
@@ -46,25 +46,25 @@ SIZES = {
     "hurdle": "height of the hurdle [mm]",
     "rough": "highest bump [mm]",
 }
-"""Kind of ground -> label of its axis."""
+"""Kind of ground -> axis label of its size."""
 
 
 @dataclass(frozen=True)
 class Terrain(Study):
-    """The same starts on flat ground and towards every obstacle, with and without adhesion, at every velocity."""
+    """Physical walks from the same starts on flat ground and towards every obstacle, per adhesion and velocity."""
 
     controller: Controller
     """Controller that plans the walks."""
     velocities: Sequence[float] = (0.2, 0.4, 0.6)
-    """Velocities V_r as fractions of V_p, 0 < V < 1; the commanded distance is the same for all."""
+    """Velocities V_r as fractions of V_p, 0 < V < 1; the commanded distance is the same at every velocity."""
     grounds: Sequence[ObstacleKind] = ("step", "gap", "hurdle", "rough")
-    """Kinds of obstacles, beside flat ground."""
+    """Kinds of obstacles; flat ground is always walked too."""
     heights: Sequence[float] = (2.0, 4.0, 6.0)
-    """Heights of steps, hurdles and rough ground [mm]."""
+    """Heights of steps, hurdles and the highest bumps of rough ground [mm]."""
     lengths: Sequence[float] = (2.5, 5.0, 10.0)
     """Lengths of gaps [mm]."""
     grasps: Sequence[float] = (0.0, 1.0)
-    """Adhesion of a standing foot, in multiples of the insect's weight."""
+    """Adhesion of a standing foot, in multiples of the insect's weight; 0 is no adhesion."""
     n_starts: int = field(default=30, kw_only=True)
     conditions: Conditions = field(default=FARTHER, kw_only=True)
 
@@ -73,7 +73,7 @@ class Terrain(Study):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not (self.observed[0] > 0).all():
-            raise InputError(f"velocities = {self.velocities}; expected V > 0, or no obstacle is ever reached")
+            raise InputError(f"velocities = {self.velocities}; expected 0 < V < 1, so that obstacles are reached")
         for name in ("grounds", "heights", "lengths", "grasps"):
             distinct(name, getattr(self, name))
         for grasp in self.grasps:
@@ -82,7 +82,7 @@ class Terrain(Study):
 
     @property
     def obstacles(self) -> dict[str, Conditions]:
-        """The conditions on flat ground and before each obstacle, by names such as 'step 2 mm'."""
+        """The conditions of flat ground, 'flat', and of each obstacle, by names such as 'step 2 mm'."""
         named = {"flat": self.conditions}
         for ground in self.grounds:
             name, sizes = ("ground_length", self.lengths) if ground == "gap" else ("ground_height", self.heights)
@@ -93,12 +93,12 @@ class Terrain(Study):
 
     @property
     def distance(self) -> float:
-        """Commanded distance [mm]."""
+        """The commanded distance of all walks [mm]."""
         _, behind = reach(self.stride)
         return max(map(_end, self.obstacles.values())) + behind + self.stride.aep0 - self.stride.pep0
 
     def cells(self) -> list[Cell]:
-        """Return a cell for each obstacle, grasp and velocity."""
+        """Return a cell for each obstacle, adhesion and velocity, computed by `outcome_table`."""
         self.check_walks(self.velocities, *(replace(self.conditions, grasp=grasp) for grasp in self.grasps))
         cells = []
         for (obstacle, conditions), grasp, v in product(self.obstacles.items(), self.grasps, self.observed[0]):
@@ -107,14 +107,14 @@ class Terrain(Study):
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return what happened to the starts.
+        """Return the falls after the obstacle was reached, and the starts that crossed the obstacle.
 
         Returns:
-            Over (obstacle, grasp, velocity), the obstacle 'flat' first: `reached`, the number of starts that did not
-            fall until a front foot could reach the obstacle, `flss`, the fraction of these that fell, with its 95 %
-            Wilson interval `flss_low`, `flss_high`, and `crossed`, the number that never fell and whose hind feet are
-            beyond the obstacle. Over start too: `OUTCOMES`, the `distance` walked [mm], and `after`, whether the start
-            fell after it had reached the obstacle.
+            Over (obstacle, grasp, velocity), the obstacle 'flat' first: `reached`, the number of starts that do not
+            fall before a front foot can reach the obstacle; `flss`, the fraction of these that fall later, with its
+            95 % Wilson interval `flss_low`, `flss_high`; and `crossed`, the number of starts without a fall whose hind
+            feet get beyond the obstacle. Over (obstacle, grasp, velocity, start): `OUTCOMES`, the `distance` walked
+            [mm], and `after`, whether the start falls after it has reached the obstacle.
         """
         before = self.obstacles.values()
         sizes = {"obstacle": len(before), "grasp": len(self.grasps), "velocity": len(self.velocities)}
@@ -150,7 +150,7 @@ class Terrain(Study):
 
 
 def _end(conditions: Conditions) -> float:
-    """Return where an obstacle ends, or a step has been climbed, ahead of O at the start [mm]."""
+    """Return how far ahead of O at time 0 an obstacle ends [mm]; steps and rough ground end where they begin."""
     return conditions.ground_at + (conditions.ground_length if conditions.ground in ("gap", "hurdle") else 0.0)
 
 
@@ -160,7 +160,7 @@ def _size(conditions: Conditions) -> float:
 
 
 def terrain_figure(result: "xr.Dataset") -> "Figure":
-    """Draw a column for each kind of ground and a row for each grasp; flat ground is at 0 mm."""
+    """Draw FLSS against obstacle size: a column for each kind of ground, a row for each adhesion, flat ground at 0."""
     ground, grasps, speeds = result.ground.values, result.grasp.values, result.velocity.values
     kinds = list(dict.fromkeys(ground[ground != "flat"]))
     figure = picture(max(4.8, 1.0 + 2.8 * len(kinds)), 1.3 + 2.6 * len(grasps))
