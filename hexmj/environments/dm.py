@@ -136,7 +136,7 @@ class Walking(control.Task):
         self._acted = self._walkers.judge(physics.shown)
 
     def action_spec(self, physics: InsectPhysics) -> specs.BoundedArray:
-        """Return the bounds of an action; its name holds the names of its numbers, separated by tabs."""
+        """Return the bounds of an action; the name of the spec lists the names of all numbers, separated by tabs."""
         low, _, high = action_bounds(physics.compiled, self.task)
         names = "\t".join(action_names(physics.compiled, self.task))
         return specs.BoundedArray(low.shape, float, low, high, names)

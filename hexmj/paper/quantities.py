@@ -133,7 +133,7 @@ class Gaits:
 
 @dataclass(frozen=True)
 class Weight:
-    """A parameter of the ideal weight sets, each found for one velocity, or the absolute ratio parameter / over."""
+    """A parameter of the ideal weight sets, or its absolute ratio to the parameter `over`, if that is given."""
 
     parameter: str
     over: str | None = None

@@ -31,7 +31,7 @@ class Domain:
     begin: np.ndarray | None = None
     """(parameter,) vector from which the search begins; None uses the default of the algorithm."""
     unit: np.ndarray | float = 1.0
-    """(parameter,) size by which the steps in each parameter are scaled."""
+    """(parameter,) scale of each parameter: mutations and simplex edges are proportional to it."""
 
     def read(self, individuals: np.ndarray) -> np.ndarray:
         """Return the parameters of individuals, (..., parameter): binary ones become 1 if above 1/2, else 0."""

@@ -174,7 +174,7 @@ class Sample:
         return np.mean(values, axis=0) if self.problem.over == "mean" else np.max(values, axis=0)
 
     def _cost(self, vector: np.ndarray, threads: int | None) -> float:
-        """Return the FLSS; with ties 'later', the mean fraction of the time that is lost counts as one more start."""
+        """Return the FLSS; with ties 'later', the mean part of the time after a loss counts as one more start."""
         if self.problem.refusal(vector):
             return REFUSED
         try:

@@ -87,9 +87,9 @@ class Found:
     vector: np.ndarray
     """(parameter,) candidate with the lowest cost in the last stage."""
     cost: float
-    """Cost of this candidate on the starts of the last stage, see `Problem.minimised`."""
+    """Cost of `vector` on the starts of the last stage, see `Problem.minimised`."""
     lost: int | None
-    """Number of starts of the last stage that it loses (falls in physical walks); None for a mean over variants."""
+    """Number of starts of the last stage that are lost, or fall, with `vector`; None for a mean over variants."""
     starts: int
     """Number of starts of the last stage."""
     history: "xr.Dataset"
