@@ -60,7 +60,7 @@ COXAE = {"front": 12.0, "middle": 10.0, "hind": 8.0}  # height of the coxae [mm]
 ABOUT, APART = 1.0, 28.5  # tolerance of the heights in COXAE, and distance from front to hind coxae [mm]
 OXYGEN = 20.1  # energy from oxygen [J/ml]
 STANCE = 0.784  # duration of the stance in Zill et al. 2018 [s]
-PAST, PAST_HALF = "coxa-trochanter torque past half its peak,", {"from": 13.2 / STANCE, "until": 71.0 / STANCE}  # %
+PAST, PAST_HALF = "coxa-trochanter torque past half its peak,", {"from": 13.2 / STANCE, "until": 71.0 / STANCE}  # % of stance
 
 SPEED = 24.0
 """Default speed at which a quantity is compared [mm/s]: V_r = 0.3 at V_p = 80 mm/s."""
@@ -75,7 +75,7 @@ class Animal:
     low: float = math.nan
     high: float = math.nan
     source: str = ""
-    """A key of `SOURCES`."""
+    """Source of the range, a key of `SOURCES`."""
     speed: float = SPEED
     """Speed at which the simulated insect is measured [mm/s]."""
     depends: bool = False
@@ -173,7 +173,7 @@ class Biology(Study):
     controller: Controller
     """Controller that plans the walks."""
     periods: int = 30
-    """Periods of a single leg that each start walks; the last three are measured."""
+    """Number of periods of a single leg that each start walks; the last three are measured."""
     n_starts: int = field(default=20, kw_only=True)
 
     hidden: ClassVar[tuple[str, ...]] = ("grasp", *GROUND)

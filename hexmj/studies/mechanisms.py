@@ -26,12 +26,12 @@ TIPPED = 0.05
 MECHANISMS = {
     "never_lost": "no planned loss and no fall",
     "still_standing": "saved: the centre of mass never left the polygon of the measured feet",
-    "too_short": "saved: it left that polygon, and came back before the trunk had tipped",
+    "too_short": "saved: the centre of mass was outside the polygon of the measured feet, but the trunk never tipped",
     "landed_in_time": "saved: the trunk had tipped, and the feet that the plan put down held it",
     "caught": "saved: the trunk came down on a foot that the plan held in the air",
     "tipped_behind": "fell as the plan lost stability, leaning back",
     "tipped_ahead": "fell as the plan lost stability, leaning ahead",
-    "thrown": "fell to another side than it had tipped to: a foot met the ground, and its leg threw the trunk",
+    "thrown": "fell to another side than it had first tipped to: a foot met the ground, and its leg threw the trunk",
     "unplanned": "fell although the margin of the plan was wide",
     "narrow": "fell although the plan did not lose stability: its margin was narrow",
 }

@@ -154,7 +154,7 @@ def strides_between(settled: "Settled", chunks: "Sequence[Chunk]", start: int, b
         np.concatenate([getattr(chunk, name)[chunk.ids == start][0] for chunk in chunks])
         for name in ("qpos", "sensors", "torque", "standing")
     )
-    moved = np.diff(qpos, axis=0) / settled.compiled.model.opt.timestep  # row t: velocity at row t + 1
+    moved = np.diff(qpos, axis=0) / settled.compiled.model.opt.timestep  # row t: mean velocity from row t to t + 1
     before = slice(begun[0] - 1, begun[-1] - 1)
     return Strides(
         settled=settled,
