@@ -60,7 +60,7 @@ COXAE = {"front": 12.0, "middle": 10.0, "hind": 8.0}  # height of the coxae [mm]
 ABOUT, APART = 1.0, 28.5  # tolerance of the heights in COXAE, and distance from front to hind coxae [mm]
 OXYGEN = 20.1  # energy from oxygen [J/ml]
 STANCE = 0.784  # duration of the stance in Zill et al. 2018 [s]
-PAST, PAST_HALF = "coxa-trochanter torque past half its peak,", {"from": 13.2 / STANCE, "until": 71.0 / STANCE}  # % of stance
+PAST, PAST_HALF = "coxa-trochanter torque past half its peak,", {"from": 13.2 / STANCE, "until": 71.0 / STANCE}  # %
 
 SPEED = 24.0
 """Default speed at which a quantity is compared [mm/s]: V_r = 0.3 at V_p = 80 mm/s."""
