@@ -1,1 +1,1 @@
-"""The command line: `commands` lists the commands, each of which is a module of its own."""
+"""The command line of hexmj: `main` lists the commands, and the other modules define them."""

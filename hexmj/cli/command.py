@@ -1,4 +1,4 @@
-"""Base of the commands: options, help with examples, running a study, and the answer with its manifest."""
+"""Base classes of the commands: they parse options, show help, run a study, write its files and print the answer."""
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,42 +23,45 @@ if TYPE_CHECKING:
 
 @dataclass
 class Answer:
-    """What a command prints: a JSON object, or tables and lines; and what its manifest records."""
+    """Answer of a command: its JSON object, its tables and lines for the terminal, and the content of its manifest."""
 
     json: Mapping[str, Any]
     lines: Iterable[Any]
     files: list[Path] = field(default_factory=list)
     """Files that the command wrote."""
     settings: Mapping[str, Any] | None = None
-    """Settings for the manifest; None writes no manifest."""
+    """Settings that the manifest records; with None, no manifest is written."""
     manifest: str = "manifest.json"
-    """Name of the manifest in the folder of --out."""
+    """File name of the manifest in the folder of --out."""
     result: "xr.Dataset | None" = None
-    """Result whose settings are recorded and stand under the lines, with a warning if starts were searched on."""
+    """Result of a study. The manifest records its settings, and the terminal shows its `settings_line`."""
 
 
 class Command:
-    """A command; its docstring is the description in `--help`."""
+    """Base class of the commands. The docstring of each command is its description in `--help`."""
 
     sources: ClassVar[tuple[type | str, ...]] = ()
-    """Dataclasses of settings that options are made from, or their places, such as "measures.compare:Comparison"."""
+    """Dataclasses whose fields become options, or places of dataclasses, such as "measures.compare:Comparison"."""
     hidden: ClassVar[tuple[str, ...]] = ()
-    """Fields of them that are not offered."""
-    usual: ClassVar[Mapping[str, Any]] = {}
-    """Options with other defaults than those of the dataclasses."""
+    """Fields of `sources` that do not become options."""
+    defaults: ClassVar[Mapping[str, Any]] = {}
+    """Option -> its default, where this command has another default than the dataclass."""
     positional: ClassVar[str] = ""
-    """Option that is given without its name."""
+    """Option whose value is given without the option's name."""
     examples: ClassVar[tuple[str, str]]
-    """Arguments of two examples for `--help`."""
+    """Arguments of the two examples that `--help` shows."""
 
     def options(self, name: str, help: bool = True) -> type:
-        """Return the class of options that tyro parses."""
-        sources = [imported(source) if isinstance(source, str) else source for source in self.sources]
-        how: Any = {"positional": self.positional, "hidden": self.hidden, "usual": self.usual}
-        return options_class(name.replace("-", "_"), *sources, help=help, **how)
+        """Return the class of options that tyro parses; without `help`, its options have no help texts."""
+        return self._options_of(self.sources, self.defaults, name, help)
+
+    def _options_of(self, places: Iterable[type | str], defaults: Mapping[str, Any], name: str, help: bool) -> type:
+        sources = [imported(place) if isinstance(place, str) else place for place in places]
+        choices: Any = {"positional": self.positional, "hidden": self.hidden, "defaults": defaults}
+        return options_class(name.replace("-", "_"), *sources, help=help, **choices)
 
     def parse(self, name: str, words: list[str]) -> SimpleNamespace:
-        """Return the options by name that the words after the command's name give."""
+        """Parse the words after the command's name, and return the values of all options by name."""
         import tyro
 
         help = not {"-h", "--help"}.isdisjoint(words)
@@ -66,8 +69,8 @@ class Command:
         if help:
             print(fill(" ".join((self.__doc__ or "").split()), 80), end="\n\n")
         try:
-            how: Any = {"prog": f"hexmj {name}", "description": "", "config": markers}
-            parsed = tyro.cli(self.options(name, help), args=words, **how)
+            parser: Any = {"prog": f"hexmj {name}", "description": "", "config": markers}
+            parsed = tyro.cli(self.options(name, help), args=words, **parser)
         except SystemExit:
             if help:
                 print("Examples:", *(f"  hexmj {name} {example}".rstrip() for example in self.examples), sep="\n")
@@ -75,7 +78,7 @@ class Command:
         return SimpleNamespace(**vars(flat(parsed)), command=[name, *words])
 
     def run(self, given: SimpleNamespace) -> Answer | None:
-        """Run the command with its options by name, and return the answer unless it has been printed."""
+        """Run the command with its parsed options. Return the answer, or None if the command has printed it itself."""
         raise NotImplementedError
 
     def execute(self, given: SimpleNamespace) -> None:
@@ -85,12 +88,12 @@ class Command:
         if (answer := self.run(given)) is None:
             return
         files, result = answer.files, answer.result
-        made = answer.settings if result is None else settings(result)
-        if made is not None and given.out:
-            files.append(save_manifest(given.command, made, files, given.out / answer.manifest))
+        recorded = answer.settings if result is None else settings(result)
+        if recorded is not None and given.out:
+            files.append(save_manifest(given.command, recorded, files, given.out / answer.manifest))
         if given.json:
-            more = {} if result is None else {"settings": made, "searched": searched(given)}
-            print_json(more | dict(answer.json) | {"files": files})
+            head = {} if result is None else {"settings": recorded, "searched": searched(given)}
+            print_json(head | dict(answer.json) | {"files": files})
         else:
             show(*answer.lines, *([] if result is None else [settings_line(given, result)]), *map(str, files))
 
@@ -99,46 +102,46 @@ class StudyCommand(Command):
     """A command that runs a study, writes its result and figures, and prints tables."""
 
     study: ClassVar[str]
-    """Place of the study's dataclass."""
+    """Place of the study's dataclass, such as "studies.terrain:Terrain"."""
     data: ClassVar[str]
-    """Name of the NetCDF file, in which options may stand in braces."""
+    """Name of the NetCDF file; an option in braces, as in "{over}.nc", is replaced by its value."""
     figures: ClassVar[Mapping[str, str]]
-    """File of a figure, without its ending -> name of the figure, see `hexmj.plot`."""
+    """File name of a figure without its suffix -> name of the figure for `hexmj.plot`."""
     manifest: ClassVar[str] = "manifest.json"
     own: ClassVar[tuple[type, ...]] = ()
-    """Dataclasses of options beside those of the study."""
+    """Dataclasses whose fields become options of this command in addition to the study's options."""
     planning: ClassVar[tuple[type, ...]] = (Planning,)
+    """Dataclasses of options for planning; () for a command without these options."""
 
     def options(self, name: str, help: bool = True) -> type:
-        self.sources = (*self.own, self.study, Results, Output, *self.planning, Workers, Figures)  # pyright: ignore
-        self.usual = {"out": Path("results") / name, **self.usual}  # pyright: ignore
-        return super().options(name, help)
+        sources = (*self.own, self.study, Results, Output, *self.planning, Workers, Figures)
+        return self._options_of(sources, {"out": Path("results") / name, **self.defaults}, name, help)
 
     def build(self, given: SimpleNamespace) -> "Study":
-        """Return the study that the options describe."""
+        """Build the study from the options."""
         return build(imported(self.study), given)
 
     def result(self, given: SimpleNamespace, study: Any) -> "xr.Dataset":
-        """Run the study."""
+        """Run the study and return its result."""
         from hexmj.sweep import run_study
 
         with at_work(given, given.command[0]) as execution:
             return run_study(study, given.out and given.out / "walks", **execution)
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        """Return the JSON answer: by default everything but single starts."""
+        """Return the JSON answer: by default all variables of the result that have no value for each start."""
         return lists_of(result.drop_dims("start", errors="ignore"))
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        """Return the tables and lines of the answer."""
+        """Return the tables and lines that the terminal shows."""
         raise NotImplementedError
 
-    def others(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
-        """Write other files, and return their paths."""
+    def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
+        """Write the files of this command beside data and figures, such as a film, and return their paths."""
         return []
 
     def run(self, given: SimpleNamespace) -> Answer:
-        """Run the study, and write the files if there is a folder for results."""
+        """Run the study, write its files unless --out is None, and return the answer."""
         from hexmj.io import results_folder, save
 
         study, folder = self.build(given), given.out and results_folder(given.out)
@@ -147,20 +150,20 @@ class StudyCommand(Command):
             files.append(save(result, folder / self.data.format(**vars(given))))
             for name, which in self.figures.items():
                 files.append(draw(result, folder / f"{name.format(**vars(given))}.{given.format}", which))
-            files += self.others(given, result)
+            files += self.write_more(given, result)
         manifest = self.manifest.format(**vars(given))
         return Answer(self.summary(result), self.shown(study, result), files, manifest=manifest, result=result)
 
 
 def imported(place: str) -> Any:
-    """Return an object by its place in hexmj, such as "measures.compare:Comparison"."""
+    """Import an object by its place in hexmj, such as "measures.compare:Comparison"."""
     module, _, name = place.partition(":")
     return getattr(import_module(f"hexmj.{module}"), name)
 
 
 @contextmanager
 def at_work(given: SimpleNamespace, label: str) -> Iterator[dict[str, Any]]:
-    """Provide the arguments of `Execution` that the options ask for, with a progress bar."""
+    """Start the workers that the options ask for and a progress bar; provide the values of `hexmj.sweep.Execution`."""
     from hexmj.progress import progress_bar
     from hexmj.sweep import threads_each, workers
 
@@ -170,7 +173,7 @@ def at_work(given: SimpleNamespace, label: str) -> Iterator[dict[str, Any]]:
 
 
 def draw(result: "xr.Dataset", path: Path, which: str | None = None) -> Path:
-    """Draw a result's figure into a file."""
+    """Draw a figure of a result and save it at `path`; `which` is a name for `hexmj.plot`."""
     from hexmj.io import save_figure
     from hexmj.plotting import as_shipped, plot
 
@@ -179,7 +182,7 @@ def draw(result: "xr.Dataset", path: Path, which: str | None = None) -> Path:
 
 
 def filmed(path: Path, recordings: "Sequence[xr.Dataset]", *film: Any) -> list[Path]:
-    """Film recordings and return the file, or nothing if films cannot be rendered on this machine."""
+    """Film recordings and return [path]; if this machine cannot render films, print the reason and return []."""
     from hexmj.replay.video import render
 
     try:
@@ -191,20 +194,20 @@ def filmed(path: Path, recordings: "Sequence[xr.Dataset]", *film: Any) -> list[P
 
 
 def searched(given: SimpleNamespace) -> dict[str, list[int]]:
-    """Return the controllers that a search found on the starts of --seed, with the seeds of their searches."""
+    """Return each controller that a search found on the starts of --seed -> all seeds of its search."""
     from hexmj.controllers.registry import searched_on
 
     names: Iterable[str] = [given.controller] if isinstance(given.controller, str) else given.controller
-    found = {what: seeds for name in names for what, seeds in searched_on(name).items()}
-    return {what: seeds for what, seeds in found.items() if given.seed in seeds}
+    found = {base: seeds for name in names for base, seeds in searched_on(name).items()}
+    return {base: seeds for base, seeds in found.items() if given.seed in seeds}
 
 
 def settings_line(given: SimpleNamespace, result: "xr.Dataset") -> str:
-    """Return what stands under every answer: the caption of the result, and a warning if starts were searched on."""
+    """Return the settings of a result as one line, with a warning if a controller was searched on the same starts."""
     from hexmj.measures.figures import caption
 
     line = caption(result).replace("$", "").replace("\N{NO-BREAK SPACE}", " ")
     if found := searched(given):
         seed = next(seed for seed in count(1998) if not any(seed in seeds for seeds in found.values()))
-        line += f"; a search used these starts to find {', '.join(found)}, so take others: --seed {seed}"
+        line += f"; {', '.join(found)}: found by a search on these starts, use fresh starts (--seed {seed})"
     return line

@@ -18,28 +18,29 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FILMED = 6
-"""Most entrants in the film."""
+"""Maximum number of controllers in the film."""
 
 QUICK: dict[str, Any] = {"velocity": (0.1, 0.5, 0.9), "starts": 200, "physical_starts": 8, "trial_starts": 4}
-"""Options of a quick league."""
+"""Option -> its default in a quick league."""
 
 
 @dataclass(frozen=True)
 class LeagueOptions:
-    """Options of a league."""
+    """Options of `hexmj league` that its study does not have."""
 
     controllers: tuple[str, ...] | None = None
-    """Entrants; wilson-ideal begins at the ideal start of wilson. By default all."""
+    """Controllers that take part, by default all of the league. With -ideal after its name (wilson-ideal), a controller
+    begins with the leg configuration of its own steady-state gait."""
     quick: bool = False
-    """A quick look: four entrants, V = 0.1, 0.5, 0.9, 200 starts, of which 8 walk in physics and 4 in each trial.
-    Sizes that you give count instead."""
+    """Run a small league: four controllers, V = 0.1, 0.5 and 0.9, 200 starts, of which 8 walk in physics and 4 in each
+    trial. Values that you give for these options take precedence."""
     no_video: bool = False
-    """Leave the film out."""
+    """Write no film."""
 
 
 class League(StudyCommand):
-    """Run a league: controllers from the literature and your own on the same starts, kinematically, in physics and in
-    trials, with tables, figures and a film. A run that was stopped resumes if it is repeated."""
+    """Compare controllers from the literature and your own on the same starts: in kinematic walks, in physics and in
+    trials. Write tables, figures and a film. Repeat the command to resume a stopped run."""
 
     study = "studies.league:League"
     own = (LeagueOptions,)
@@ -58,19 +59,19 @@ class League(StudyCommand):
         given.entrants = entrants(names)
         given.controller = list(dict.fromkeys(name.removesuffix(IDEAL) for name in names))
         if given.quick:
-            usual = {option.name: option.default for option in option_fields(League, "")}
-            vars(given).update((name, value) for name, value in QUICK.items() if vars(given)[name] == usual[name])
+            defaults = {option.name: option.default for option in option_fields(League, "")}
+            vars(given).update((name, value) for name, value in QUICK.items() if vars(given)[name] == defaults[name])
         return build(League, given, controllers=given.entrants)
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.studies.standings import tables
 
-        for one in tables(result):
-            yield one.title
-            yield from tables_that_fit(one.head, one.rows)
+        for ranking in tables(result):
+            yield ranking.title
+            yield from tables_that_fit(ranking.head, ranking.rows)
 
-    def others(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
-        """Write the tables, and film the best entrants in physics side by side from the first random start."""
+    def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
+        """Write the tables as Markdown, and a film of the best controllers, which walk in physics from start 0."""
         from hexmj.files import write_text
         from hexmj.replay.film import Film
         from hexmj.replay.recording import Start
@@ -82,23 +83,23 @@ class League(StudyCommand):
         best = [name for name in ranked if not is_ideal(name, given.entrants[name])][:FILMED]
         if given.no_video or not best:
             return files
-        how: Any = {"velocity": given.trial_velocity, "start": 0, "acceleration": None}
-        walks = {name: build(Start, given, controller=given.entrants[name], **how) for name in best}
+        start: Any = {"velocity": given.trial_velocity, "start": 0, "acceleration": None}
+        walks = {name: build(Start, given, controller=given.entrants[name], **start) for name in best}
         shown = [walk.recorded(True, name, given.threads) for name, walk in walks.items()]
         return files + filmed(given.out / "league.mp4", shown, Film(width=480, height=360))
 
 
 @dataclass(frozen=True)
 class AblateOptions:
-    """Options of an ablation."""
+    """Options of `hexmj ablate` that its study does not have."""
 
     controllers: tuple[str, ...] = ("ldvs", "walknet")
-    """Weight sets of the 1998 network by name, walknet or walknet-reacog."""
+    """Complete controllers: weight sets of the 1998 network, walknet or walknet-reacog."""
 
 
 class Ablate(StudyCommand):
-    """Measure what each mechanism of the network or rule of Walknet contributes: the same starts without it, in
-    kinematic walks, in the steady-state gait and in physics. A run that was stopped resumes if it is repeated."""
+    """Measure the contribution of each mechanism of the 1998 network or rule of Walknet: leave it out and walk the same
+    starts, in kinematic walks, in the steady-state gait and in physics. Repeat the command to resume a stopped run."""
 
     study = "studies.ablation:Ablation"
     own = (AblateOptions,)
@@ -120,7 +121,8 @@ class Ablate(StudyCommand):
         for measure, title in MEASURES.items():
             data = result.sel(measure=measure)
             starts = data.frequency_starts.max().item()
-            yield f"{measure}: {title}; frequency of {starts} starts, and how far it is above the whole's (* for sure)"
+            heading = f"{measure}: {title}; frequency over {starts} starts"
+            yield f"{heading} (minus that of the complete controller; * if the difference is significant)"
             velocities = result.velocity.values
             rows = [
                 (name, *(_ablated(data.sel(controller=name, velocity=v)) for v in velocities))
@@ -130,41 +132,42 @@ class Ablate(StudyCommand):
 
 
 def _ablated(data: "xr.Dataset") -> str:
-    """Return the frequency in one cell, and the difference to the whole."""
+    """Return the text of a table's cell: the frequency, and its difference from that of the complete controller."""
     starts, physical = data.frequency_starts.item(), data.measure.item() == "physical"
     frequency = "-" if not starts else f"{data.frequency.item():.3f}"
     frequency += f" of {starts}" if physical and 0 < starts < data.attrs["physical_starts"] else ""
-    more = data.more.item()
-    if data.controller.item() == data.whole.item() or more != more:
+    change = data.more.item()
+    if data.controller.item() == data.whole.item() or change != change:
         return frequency
-    sure = "*" if data.more_low.item() > 0 or data.more_high.item() < 0 else ""
-    return f"{frequency} ({more:+.3f}{sure})"
+    significant = "*" if data.more_low.item() > 0 or data.more_high.item() < 0 else ""
+    return f"{frequency} ({change:+.3f}{significant})"
 
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """Options of a search."""
+    """Options of `hexmj search` that `Effort` and `Problem` do not have."""
 
     velocities: tuple[float, ...] = (0.3,)
-    """Problem 1: a velocity V_r as a fraction of V_p, 0 <= V < 1; problem 2: the least and the greatest of a range."""
+    """Velocity V_r of the walks (problem 1), or the least and the greatest V_r of a range (problem 2); fractions of
+    V_p, 0 <= V < 1."""
     out: Path = Path("results/search")
     """Folder for the controller found (TOML), the history (NetCDF), a figure, a manifest and cached evaluations."""
     form: str = "ldvs"
-    """Parameters of the 1998 network that are searched: nine (hws), ten with a neutral position that depends on the
-    velocity (ldvs), 29 with mirror symmetry (mirrored), or all 58 weights (general); or a controller of your own, whose
-    float fields are searched."""
+    """Parameters that are searched. Of the 1998 network: nine (hws), ten with a neutral position that depends on the
+    velocity (ldvs), 29 with mirror symmetry (mirrored), or all 58 weights (general). With the name of a controller of
+    your own (mine.py:Mine): its float fields."""
     physical: bool = False
     """Minimise falls of the insect in MuJoCo instead of losses of the planned stability."""
     begin: str | None = None
-    """Controller from which the population begins, with its order of updates and model variant. By default the paper's
-    '0'-individual (evolution), the middle of the domain (cmaes), or the usual values of a controller of your own."""
+    """Controller that gives the first population's parameters, the order of updates and the model variant. By default
+    the paper's '0'-individual (evolution), the middle of the domain (cmaes), or the defaults of your own controller."""
     fresh: bool = False
-    """Discard the cached evaluations of this search."""
+    """Discard the cached evaluations of this search, and evaluate everything again."""
 
 
 class Search(Command):
-    """Search for parameters that minimise the FLSS: a population with few starts, then the downhill simplex with many,
-    and a verdict on fresh starts. A search that was stopped resumes if it is repeated."""
+    """Search for parameters that minimise the FLSS: first with a population and few starts, then with the downhill
+    simplex and many starts. Fresh starts then test the result. Repeat the command to resume a stopped search."""
 
     sources = (SearchOptions, "search.stages:Effort", "search.problems:Problem", Output, Planning, Threads, Figures)
     hidden = ("low", "high")
@@ -174,8 +177,8 @@ class Search(Command):
         from hexmj.search.results import run_search, title
 
         problem, effort = self.settings(given)
-        how: Any = {"threads": given.threads, "fresh": given.fresh, "figure": f"convergence.{given.format}"}
-        result = run_search(problem, effort, given.out, progress=True, **how)
+        execution: Any = {"threads": given.threads, "fresh": given.fresh, "figure": f"convergence.{given.format}"}
+        result = run_search(problem, effort, given.out, progress=True, **execution)
         rows = zip(problem.form.names, *result.vectors.values(), strict=True)
         numbers = [(name, *(f"{value:.4g}" for value in values)) for name, *values in rows]
         verdict, times = result.verdict, result.verdict.observation_time.values.tolist()
@@ -194,7 +197,7 @@ class Search(Command):
         return Answer(result.summary(), lines, result.files, result.settings)
 
     def settings(self, given: SimpleNamespace) -> Any:
-        """Return the problem and the effort that the options describe."""
+        """Build the search problem and its effort (algorithm, budgets and starts) from the options."""
         from hexmj.search.forms import named_form
         from hexmj.search.problems import Problem
         from hexmj.search.stages import Effort
@@ -211,18 +214,18 @@ class Search(Command):
 
 @dataclass(frozen=True)
 class CheckOptions:
-    """Options of the interface checks."""
+    """Options of `hexmj check-controller`."""
 
     name: str
-    """The controller."""
+    """Controller to check: a name, a TOML file, module:object or file.py:object."""
     velocities: Sequence[float] = (0.0, 0.02, 0.5, 0.95)
-    """Two or more velocities V_r at which it can plan, each 0 <= V < 1; it must also accelerate to them."""
+    """Two or more velocities V_r at which the controller must plan and to which it must accelerate, each 0 <= V < 1."""
     dt: float = Stride.dt
-    """Time step of the plans, of which 600 are checked [time units]."""
+    """Time step of the plans [time units]; 600 steps are checked."""
 
 
 class CheckController(Command):
-    """Check whether a controller keeps the interface of hexmj. Each failed check names the error, and the exit code is
+    """Check whether a controller follows the interface of hexmj. A failed check reports its error, and the exit code is
     then 1."""
 
     sources = (CheckOptions, Output)

@@ -29,26 +29,26 @@ with mujoco.Renderer(model, 48, 64) as renderer:
     renderer.update_scene(data)
     assert renderer.render().std() > 1, "the frame is empty"
 """
-"""Renders a frame in a process of its own, since a driver may end the process."""
+"""Script that renders a frame. It runs in a separate process, because a faulty driver can end its process."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The finding of one check."""
+    """Result of one check."""
 
     name: str
     well: bool
     found: str
-    """What was found, or the error."""
+    """What the check found, or its error."""
     remedy: str = ""
     """What to do if the check fails."""
     note: bool = False
-    """Whether an optional part is not installed."""
+    """True if only an optional package is missing."""
 
 
 class Doctor(Command):
-    """Check Python and package versions, threads, rendering, films, compiled code and a short walk. Each check that
-    fails names a remedy, and the exit code is 1."""
+    """Check Python and package versions, threads, rendering, films, compiled code and a short walk. A failed check
+    names a remedy, and the exit code is then 1."""
 
     sources = (Output,)
     examples = ("", "--json")
@@ -58,7 +58,7 @@ class Doctor(Command):
 
 
 def examine() -> Iterator[Finding]:
-    """Run every check in turn; its error becomes the finding."""
+    """Run every check and yield its finding; the error of a failed check becomes the finding."""
     for name, (check, remedy) in CHECKS.items():
         try:
             yield Finding(name, True, check())
@@ -70,15 +70,14 @@ def examine() -> Iterator[Finding]:
 
 
 def versions() -> str:
-    """Python and all packages are within the bounds that hexmj requires."""
+    """Check that the versions of Python and all packages are within the bounds that hexmj requires."""
     from packaging.requirements import Requirement
     from packaging.specifiers import SpecifierSet
 
     needed = [Requirement(line) for line in requires("hexmj") or []]
-    needed = [one for one in needed if not one.marker or one.marker.evaluate({"extra": ""})]
-    bounds = {"python": SpecifierSet(metadata("hexmj")["Requires-Python"])} | {
-        one.name: one.specifier for one in needed
-    }
+    needed = [package for package in needed if not package.marker or package.marker.evaluate({"extra": ""})]
+    bounds = {"python": SpecifierSet(metadata("hexmj")["Requires-Python"])}
+    bounds |= {package.name: package.specifier for package in needed}
     found = {name: platform.python_version() if name == "python" else version(name) for name in bounds}
     if wrong := [name for name in bounds if not bounds[name].contains(found[name], prereleases=True)]:
         raise RuntimeError("; ".join(f"{name} {found[name]}, expected {bounds[name]}" for name in wrong))
@@ -86,18 +85,18 @@ def versions() -> str:
 
 
 def threads() -> str:
-    """A container's quota of processor time suffices for a thread per core."""
+    """Check that a container's quota of processor time is large enough for one thread per core."""
     from hexmj.threads import cores
 
     quota = Path("/sys/fs/cgroup/cpu.max")
     share, period = quota.read_text().split() if quota.is_file() else ("max", "1")
     if share != "max" and int(share) < cores() * int(period):
-        raise RuntimeError(f"{cores()} threads would share a quota of {int(share) / int(period):g} cores")
-    return f"{cores()}, one for each core that this process may use (of {os.cpu_count()})"
+        raise RuntimeError(f"{cores()} threads for a quota of {int(share) / int(period):g} cores")
+    return f"{cores()} threads, one for each core that this process may use (of {os.cpu_count()})"
 
 
 def rendering() -> str:
-    """MuJoCo renders a frame."""
+    """Check that MuJoCo renders a frame."""
     done = subprocess.run([sys.executable, "-P", "-c", RENDERING], capture_output=True, text=True, timeout=120)
     if done.returncode != 0:
         raise RuntimeError((done.stderr.strip().splitlines() or [f"the process ended with {done.returncode}"])[-1])
@@ -105,7 +104,7 @@ def rendering() -> str:
 
 
 def films() -> str:
-    """ffmpeg encodes frames."""
+    """Check that ffmpeg encodes frames."""
     import imageio_ffmpeg
     import mediapy
     import numpy as np
@@ -117,19 +116,19 @@ def films() -> str:
 
 
 def compiled() -> str:
-    """numba caches compiled code."""
+    """Check that numba compiles code and can write its cache."""
     from hexmj.controllers.cruse1998 import kernel
 
     record: Any = kernel.record
     if not hasattr(record, "stats"):
-        raise RuntimeError("NUMBA_DISABLE_JIT is set, so that nothing is compiled")
+        raise RuntimeError("NUMBA_DISABLE_JIT is set, so numba does not compile")
     folder = record.stats.cache_path
     with tempfile.TemporaryFile(dir=folder):
         return f"cached in {folder}"
 
 
 def walking() -> str:
-    """Two insects walk without a fall, to the same bits on one thread and on all."""
+    """Check that two insects walk without a fall, and that one thread and all threads compute the same bits."""
     import numpy as np
 
     from hexmj.controllers.cruse1998 import LDVS
@@ -138,39 +137,39 @@ def walking() -> str:
 
     single, several = (physical_walk(draw_starts(2, 0), LDVS, 0.1, 20.0, threads=n) for n in (1, None))
     if np.isfinite(single.outcomes.fall).any():
-        raise RuntimeError("an insect fell that does not fall on other machines")
+        raise RuntimeError("an insect fell in a walk that has no fall on other machines")
     if not np.array_equal(single.qpos, several.qpos):
         raise RuntimeError("walks on one thread and on several differ")
-    return "two insects for 20 time units, with the same bits on one thread and on all"
+    return "two insects walked for 20 time units, with the same bits on one thread and on all"
 
 
 CHECKS: dict[str, tuple[Callable[[], str], str]] = {
     "versions": (versions, "Install hexmj into a fresh environment with Python 3.11 or newer."),
-    "threads": (threads, "Give --threads with the number of granted cores."),
+    "threads": (threads, "Pass the number of granted cores with --threads."),
     "rendering": (rendering, "Install libegl1 libgl1-mesa-dri libopengl0 and set MUJOCO_GL=egl; only films need it."),
     "films": (films, "Reinstall imageio-ffmpeg and mediapy, or set IMAGEIO_FFMPEG_EXE; only films need it."),
     "compiled code": (compiled, "Unset NUMBA_DISABLE_JIT, and set NUMBA_CACHE_DIR to a writable folder."),
     "walking": (walking, "Apply the other remedies, or reinstall mujoco and numba."),
 }
-"""Name of a check -> the check, and its remedy."""
+"""Name of a check -> its function, and the remedy for its failure."""
 
 
 @dataclass(frozen=True)
 class RerunOptions:
-    """Options of a repetition."""
+    """Options of `hexmj rerun`."""
 
     result: Path
-    """A folder that a command wrote results to, or one manifest in it. Files that the command named, such as mine.py,
-    are looked for in the current directory."""
+    """Folder with the results of a command, or a manifest in it. Relative paths in that command, such as mine.py, are
+    read from the current directory."""
     threads: int | None = None
-    """Threads of the repeated command. No result depends on it."""
+    """Number of threads of the repeated command; results do not depend on it."""
     processes: int | None = None
-    """Processes of the repeated command, if it has this option. No result depends on it."""
+    """Number of processes of the repeated command, if it has this option; results do not depend on it."""
 
 
 class Rerun(Command):
-    """Repeat the command of a manifest in a temporary folder, and compare all numbers to the last bit. If any differs,
-    the exit code is 1, and the versions that differ are named."""
+    """Repeat the command that a manifest records, in a temporary folder, and compare all numbers bit for bit. Package
+    versions that have changed are listed. The exit code is 1 if a number differs."""
 
     sources = (RerunOptions, Output)
     positional = "result"
@@ -182,13 +181,13 @@ class Rerun(Command):
 
         found = [given.result] if given.result.is_file() else sorted(given.result.glob(f"*{MANIFEST}"))
         if not found:
-            raise InputError(f"{given.result} holds no {MANIFEST} of a command")
+            raise InputError(f"{given.result} has no {MANIFEST}; expected the folder of a command's results")
         then = read_manifest(found[0])
         names = [name for name in then["files"] if name.endswith(".nc")]
         if not names:
-            raise InputError(f"{found[0]} names no NetCDF file to compare")
-        more = {"--threads": given.threads, "--processes": given.processes}
-        words = [word for name, value in more.items() if value is not None for word in (name, str(value))]
+            raise InputError(f"{found[0]} lists no NetCDF file; only NetCDF files can be compared")
+        options = {"--threads": given.threads, "--processes": given.processes}
+        words = [word for name, value in options.items() if value is not None for word in (name, str(value))]
         with tempfile.TemporaryDirectory(prefix="hexmj-rerun-") as folder:
             with redirect_stdout(StringIO()):
                 run([*_without_output(then["command"]), *words, "--out", folder])
@@ -200,8 +199,8 @@ class Rerun(Command):
         if given.json:
             print_json({"equal": equal, "command": then["command"], "differences": files, "versions": versions})
         else:
-            show(*(f"{name}: {text or 'equal to the last bit'}" for name, text in files.items()))
-            show(*(f"{name} was {old}, now it is {new}" for name, (old, new) in versions.items()))
+            show(*(f"{name}: {text or 'all bits are equal'}" for name, text in files.items()))
+            show(*(f"version of {name}: {old} in the manifest, {new} now" for name, (old, new) in versions.items()))
         sys.exit(0 if equal else 1)
 
 
@@ -213,7 +212,7 @@ def _without_output(words: list[str]) -> list[str]:
 
 
 def _difference(then: Path, now: Path) -> str:
-    """Return how two files differ, or an empty text."""
+    """Return the differences between two NetCDF files as a text, or "" if there are none."""
     import xarray as xr
 
     from hexmj.files import read_netcdf

@@ -31,8 +31,8 @@ Studies
   map               physical FLSS over the velocity and one condition
   disturb           walks with a halt, a stopped leg or a push
   terrain           falls at steps, gaps, hurdles and on rough ground
-  converge          the same starts at smaller and smaller V_p
-  biology           forces, gait, posture and work beside those of insects
+  converge          the same starts at decreasing V_p
+  biology           forces, gait, posture and work compared with insects
 
 Controllers
   league            all controllers on the same starts: tables, figures, film
@@ -59,14 +59,14 @@ MODULES = {
     "paper": ("reproduce",),
     "machine": ("doctor", "rerun"),
 }
-"""Module -> its commands; `check-controller` is the class `CheckController`."""
+"""Module of `hexmj.cli` -> its commands. The class of `check-controller` is `CheckController`."""
 
 COMMANDS = {name: module for module, names in MODULES.items() for name in names}
 
 
 def main() -> None:
     """Run `hexmj`: exit code 2 for bad input, 1 for a failed simulation or rendering, 130 for Ctrl-C."""
-    sys.path.append("")  # modules of the user in the current directory, as with `python -m hexmj`
+    sys.path.append("")  # finds the user's modules in the current directory, as `python -m hexmj` does
     use_egl_without_display()
     try:
         run(sys.argv[1:])
@@ -82,11 +82,7 @@ def main() -> None:
 
 
 def run(words: list[str]) -> None:
-    """Run a command.
-
-    Args:
-        words: the command line after `hexmj`.
-    """
+    """Run the command that `words`, the command line after `hexmj`, asks for."""
     match words:
         case [] | ["-h" | "--help"]:
             print(HELP)
@@ -98,7 +94,7 @@ def run(words: list[str]) -> None:
             chosen = command(name)
             chosen.execute(chosen.parse(name, rest))
         case [name, *_]:
-            raise InputError(f"{name!r} is no command; `hexmj --help` lists them")
+            raise InputError(f"unknown command {name!r}; `hexmj --help` lists the commands")
 
 
 def command(name: str) -> "Command":
@@ -107,7 +103,7 @@ def command(name: str) -> "Command":
 
 
 def _complete(words: list[str]) -> None:
-    """Print or write what completes commands and options in a shell."""
+    """Print or write the script with which a shell completes commands and options."""
     from functools import reduce
     from operator import or_
     from typing import Annotated
@@ -115,8 +111,8 @@ def _complete(words: list[str]) -> None:
     import tyro
 
     commands: list[Any] = [Annotated[command(name).options(name), tyro.conf.subcommand(name)] for name in COMMANDS]
-    every: Any = reduce(or_, commands)
-    tyro.cli(every, prog="hexmj", args=words)
+    union: Any = reduce(or_, commands)
+    tyro.cli(union, prog="hexmj", args=words)
 
 
 def _exit(message: Exception | str, code: int) -> None:

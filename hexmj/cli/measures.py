@@ -10,21 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.cli.command import Answer, Command, StudyCommand, draw, filmed
-from hexmj.cli.options import (
-    Figures,
-    Output,
-    Planning,
-    Threads,
-    build,
-    controller,
-    no_effect,
-)
-from hexmj.cli.output import (
-    Column,
-    four_digits,
-    grid,
-    report_line,
-)
+from hexmj.cli.options import Figures, Output, Planning, Threads, build, controller, no_effect
+from hexmj.cli.output import Column, four_digits, grid, report_line
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 
@@ -33,28 +20,28 @@ if TYPE_CHECKING:
 
 
 PHYSICAL = tuple(member.name for member in fields(Conditions) if member.name != "body")
-"""Conditions, in the order of their fields."""
+"""Options that set a field of `Conditions`, in the order of the fields."""
 
 FOOT_PATH = ("vp", "step_height", "standing_height", "lift_time", "landing_time")
-"""Conditions that a recording of a plan shows as well."""
+"""Options of `PHYSICAL` that also change the recording of a kinematic walk."""
 
 TIMES = ("planned loss", "measured loss", "fall")
-"""Events of a walk, which may not happen."""
+"""Entries of a walk's summary that are times [time units]; infinity says that the event does not happen."""
 
 
 @dataclass(frozen=True)
 class WalkOptions:
-    """Options of one walk."""
+    """Options of `hexmj walk` that `Start` does not have."""
 
     physical: bool = False
-    """Walk the insect in MuJoCo; otherwise the recording shows the plan."""
+    """Simulate the insect in MuJoCo. Without this option, the walk is kinematic and the recording shows the plan."""
     out: Path = Path("results/walk")
     """Folder for the recording, the figure and the manifest."""
 
 
 class Walk(Command):
-    """Walk once, kinematically or physically, and write a recording (NetCDF) and a figure with the footfall diagram
-    and the stability margin."""
+    """Compute one kinematic or physical walk. Write a recording (NetCDF) and a figure with the footfall diagram and the
+    stability margin."""
 
     sources = (WalkOptions, "replay.recording:Start", Output, Planning, Threads, Figures)
     examples = ("--velocity 0.5", "--controller wilson --physical --seed 7 --json")
@@ -72,13 +59,13 @@ class Walk(Command):
         files = [save_recording(walked, out / "recording.nc"), draw(walked, out / f"walk.{given.format}")]
         summary = recording_summary(walked)
         lines = [f"{key}: {_in_words(key, value)}" for key, value in summary.items() if value is not None]
-        made = walked.drop_vars(walked.variables).assign_attrs(attributes(settings))
-        return Answer(summary | {"settings": settings}, [title, *lines], files, result=made)
+        result = walked.drop_vars(walked.variables).assign_attrs(attributes(settings))
+        return Answer(summary | {"settings": settings}, [title, *lines], files, result=result)
 
 
 @dataclass(frozen=True)
 class FlssOptions:
-    """Options of FLSS."""
+    """Options of `hexmj flss` that its study does not have."""
 
     controller: Controller
     n_starts: int | None = None
@@ -88,17 +75,17 @@ class FlssOptions:
     physical: bool = False
     """Count falls of the insect in MuJoCo instead of losses of the planned stability."""
     range_of: int | None = None
-    """Starts that are computed and cached as one cell, by default 1600000; no result depends on it."""
+    """Number of starts that are computed and cached together, by default 1600000; results do not depend on it."""
     conditions: Conditions = Conditions()
 
 
 class Flss(StudyCommand):
-    """Measure the FLSS of a controller over velocities, kinematic or physical. A run with --out that was stopped
-    resumes if it is repeated."""
+    """Measure the kinematic or physical FLSS (frequency of the loss of static stability) of a controller at one or more
+    velocities. Repeat the command to resume a stopped run with --out."""
 
     study = "measures.kinematic:KinematicFlss"
     own = (FlssOptions,)
-    usual = {"out": None}  # noqa: RUF012
+    defaults = {"out": None}  # noqa: RUF012
     data = "flss.nc"
     figures = {"flss": "flss"}  # noqa: RUF012
     examples = ("--velocity 0.5", "--physical --velocity 0.3 0.5 --starts 50 --out results/flss")
@@ -115,8 +102,8 @@ class Flss(StudyCommand):
     def result(self, given: SimpleNamespace, study: Any) -> "xr.Dataset":
         from hexmj.io import attributes
 
-        made = {"model": given.controller, "physical": given.physical}
-        return super().result(given, study).assign_attrs(attributes(made))
+        own = {"model": given.controller, "physical": given.physical}
+        return super().result(given, study).assign_attrs(attributes(own))
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         from hexmj.measures.compare import physical_report
@@ -136,7 +123,7 @@ class Flss(StudyCommand):
 
 
 def _over_velocity(result: "xr.Dataset") -> list[str]:
-    """Return the variables with one number for each velocity."""
+    """Return the names of the variables with one number for each velocity."""
     return [str(name) for name, values in result.items() if values.dims == ("velocity",)]
 
 
@@ -146,25 +133,25 @@ def _four_digits(name: str) -> Column:
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """Options of a comparison."""
+    """Options of `hexmj compare` that its study does not have."""
 
     no_video: bool = False
-    """Leave the video out."""
+    """Write no video."""
 
 
 class Compare(StudyCommand):
-    """Compare the kinematic, measured and physical FLSS of controllers on the same starts: table, figure, NetCDF,
-    manifest and a gait video. A run that was stopped resumes if it is repeated."""
+    """Compare the kinematic, measured and physical FLSS of controllers on the same starts. Write a table, a figure,
+    NetCDF, a manifest and a gait video. Repeat the command to resume a stopped run."""
 
     study = "measures.compare:Comparison"
     own = (CompareOptions,)
-    usual = {"controller": ("ldvs", "uncoordinated")}  # noqa: RUF012
+    defaults = {"controller": ("ldvs", "uncoordinated")}  # noqa: RUF012
     data = "comparison.nc"
     figures = {"comparison": "comparison"}  # noqa: RUF012
     examples = ("", "--controller hws wilson --velocity 0.5 --starts 20 --no-video")
 
-    def others(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
-        """Write a recording of the first controller near V = 0.3, from a start that stays stable, and its video."""
+    def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
+        """Write a recording and a video of the first controller near V = 0.3, from a start that stays stable if any."""
         from hexmj.replay.recording import Start, save_recording
 
         if given.no_video:
@@ -199,8 +186,8 @@ class Compare(StudyCommand):
         yield "Frequency of the loss of static stability, with 95 % intervals; physical: falls"
         yield grid(result, axes, columns | {name: name for name in MEASURES})
         yield (
-            "Starts that lost the planned stability and fell (both), did either (kin., phys.) or none; speed over the"
-            " commanded one, least to greatest of the starts that did not fall"
+            "Numbers of starts that lost the planned stability and fell (both), only lost it (kin.), only fell (phys.)"
+            " or neither (none); speed / commanded speed, minimum-maximum over the starts that did not fall"
         )
         yield grid(result, axes, answers | {"speed": _speeds})
         yield report_line(physical_report(result))
@@ -211,13 +198,13 @@ def _count(name: str) -> Column:
 
 
 def _speeds(data: "xr.Dataset") -> str:
-    """Return the least and the greatest speed of the starts that did not fall, over the commanded one."""
+    """Return minimum and maximum of speed / commanded speed over the starts that did not fall."""
     speed = data.speed.values[np.isinf(data.fall.values)]
     return f"{speed.min():.2f}-{speed.max():.2f}" if np.isfinite(speed).any() else "-"
 
 
 def _in_words(key: str, value: Any) -> str:
-    """Return a number of a walk as text; an event may not happen."""
+    """Return the value of an entry of a walk's summary as text; `key` is the name of the entry."""
     if key in TIMES:
         return f"at {four_digits(value)} time units" if math.isfinite(value) else "none within the walk"
     return str(value) if not isinstance(value, float) else "-" if math.isnan(value) else four_digits(value)

@@ -20,7 +20,7 @@ from hexmj.timing import Acceleration, Stride
 from hexmj.validate import distinct
 
 NAMES = {"controllers": "controller", "velocities": "velocity", "n_starts": "starts"}
-"""Field of settings -> its option, where they differ."""
+"""Name of a dataclass field -> name of its option, where the two names differ."""
 
 COMMON = ("controller", "velocity", "starts", "seed", "vp", "observation_time", "out", "json")
 """Options that `--help` shows first, in this order, in all commands that have them."""
@@ -29,37 +29,38 @@ CONTROLLER = (
     "a weight set (hws, ldvs, uncoordinated, own, robust-0.3, lasting, ...), a baseline controller (wilson, graham,"
     " walknet, ...; `hexmj league` runs all), a TOML file, module:object, file.py:object or an entry point"
 )
-"""How controllers are named."""
+"""Ways to name a controller, for the help texts."""
 
 TYPES = {int: "INT", float: "FLOAT", str: "TEXT", Path: "PATH"}
 METAVARS = {"controller": "NAME", "observation_time": "TIME"}
+"""Type, or name of an option -> placeholder of the value in `--help`."""
 
 
 @dataclass(frozen=True)
 class Planning:
-    """How controllers plan."""
+    """Options that change how controllers plan."""
 
     group: ClassVar[str] = "walk"
 
     order: Literal["printed", "undelayed", "sequential"] | None = None
-    """Order of updates of the 1998 network; by default that of the weight set."""
+    """Order in which the 1998 network updates its state; by default, the weight set determines it."""
     model_variant: str | None = None
-    """Variant of the 1998 model, 'printed' or 'lasting'; by default that of the weight set."""
+    """Variant of the 1998 model, 'printed' or 'lasting'; by default, the weight set determines it."""
     feedback: bool = False
-    """Give the controller sensory feedback: tips and ground contact before each of its steps."""
+    """Give the controller sensory feedback: tip positions and ground contacts before each of its steps."""
 
 
 @dataclass(frozen=True)
 class Output:
-    """How a command reports."""
+    """Options of the output."""
 
     json: bool = False
-    """Print one JSON object and nothing else on standard output."""
+    """Print the answer as one JSON object, and nothing else on standard output."""
 
 
 @dataclass(frozen=True)
 class Results:
-    """Where the results of a study are written."""
+    """Options of the files of a study."""
 
     out: Path = Path("results")
     """Folder for figures, NetCDF, manifest and cached results."""
@@ -67,7 +68,7 @@ class Results:
 
 @dataclass(frozen=True)
 class Figures:
-    """How figures are written."""
+    """Options of figures."""
 
     format: Literal["png", "pdf", "svg"] = "png"
     """Format of the figures."""
@@ -75,28 +76,28 @@ class Figures:
 
 @dataclass(frozen=True)
 class Threads:
-    """Execution on threads."""
+    """Options of execution on threads."""
 
     group: ClassVar[str] = "execution"
 
     threads: int | None = None
-    """Threads; by default one per core. No result depends on it."""
+    """Number of threads, by default one per core; results do not depend on it."""
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Execution of cells. No result depends on these options, and finished cells are cached in the results' folder."""
+    """Options of the execution of a study's cells; results do not depend on them."""
 
     group: ClassVar[str] = "execution"
 
     threads: int | None = None
-    """Threads of each process; by default the processes share the cores."""
+    """Number of threads of each process; by default the processes share the cores equally."""
     processes: int = 1
     """Number of processes."""
     scheduler: str | None = None
-    """Address of a Dask scheduler such as tcp://127.0.0.1:8786; its workers must see the results' folder."""
+    """Dask scheduler, such as tcp://127.0.0.1:8786; its workers compute and must be able to access the folder --out."""
     fresh: bool = False
-    """Compute everything again, and replace cached results."""
+    """Ignore cached results: compute everything again and replace them."""
 
 
 @dataclass(frozen=True)
@@ -110,33 +111,33 @@ class Option:
 
 
 def option_fields(
-    settings: type, title: str, hidden: Collection[str] = (), usual: Mapping[str, Any] = {}
+    settings: type, title: str, hidden: Collection[str] = (), defaults: Mapping[str, Any] = {}
 ) -> Iterator[Option]:
-    """Yield the options for a dataclass of settings.
+    """Yield one option for each field of a dataclass of settings.
 
-    A controller is given by name; `Conditions`, `Stride` and `Acceleration` become options of their own.
+    A field of type `Conditions`, `Stride` or `Acceleration` becomes one option for each of its own fields.
 
     Args:
-        settings: the dataclass. Its class variable `hidden` names conditions that are not offered, and `group` its
-            group of options.
-        title: group of its options, unless it names another.
-        hidden: other fields that are not offered.
-        usual: defaults by option that replace those of the dataclass.
+        settings: the dataclass. Its class variable `hidden`, if any, names fields and conditions without an option;
+            its class variable `group` names the group of its options.
+        title: group of the options of a dataclass without `group`.
+        hidden: further fields without an option.
+        defaults: option -> default that replaces the one of the dataclass.
     """
     hints, group = get_type_hints(settings), getattr(settings, "group", title)
     left_out = {"body", *hidden, *getattr(settings, "hidden", ())}
     for member in fields(settings):
         kind, name = hints[member.name], NAMES.get(member.name, member.name)
-        default = _default(member, usual.get(name, MISSING))
+        default = _default(member, defaults.get(name, MISSING))
         if member.name in left_out or name in left_out:
             continue
         if several := {Conditions, Stride}.intersection((kind, *get_args(kind))):
             (kind,) = several
             for part in option_fields(kind, "walk" if kind is Stride else "conditions", left_out):
-                value = usual.get(part.name, getattr(default, part.name, part.default))
+                value = defaults.get(part.name, getattr(default, part.name, part.default))
                 yield Option(part.name, part.kind, value, part.group)
         elif Acceleration in (kind, *get_args(kind)):
-            yield Option("acceleration", float | None, usual.get("acceleration"), "walk")
+            yield Option("acceleration", float | None, defaults.get("acceleration"), "walk")
             yield Option("initial_velocity", float | None, None, "walk")
         else:
             yield Option(name, kind, default, group)
@@ -147,22 +148,22 @@ def options_class(
     *sources: type,
     positional: str = "",
     hidden: Collection[str] = (),
-    usual: Mapping[str, Any] = {},
+    defaults: Mapping[str, Any] = {},
     help: bool,
 ) -> type:
-    """Return the class that tyro parses for several dataclasses of settings, with a member for each group of options.
+    """Return the class that tyro parses, with one member for each group of options.
 
     Args:
-        title: group of the options that are particular to the command.
-        sources: dataclasses of settings; of options with the same name, the first counts.
-        positional: name of an option that is given without its name.
-        hidden: fields that are not offered.
-        usual: defaults that replace those of the dataclasses.
-        help: whether the texts of the options are needed.
+        title: name of the group of the command's own options.
+        sources: dataclasses whose fields become options; if two have the same option, the first dataclass defines it.
+        positional: option whose value is given without the option's name.
+        hidden: fields without an option.
+        defaults: option -> default that replaces the one of its dataclass.
+        help: whether the options get their help texts.
     """
     found: dict[str, Option] = {}
     for source in sources:
-        for option in option_fields(source, title, hidden, usual):
+        for option in option_fields(source, title, hidden, defaults):
             found.setdefault(option.name, option)
     texts = _texts(Stride, Conditions, *reversed(sources)) if help else {}
     common = [found.pop(name) for name in COMMON if name in found]
@@ -179,7 +180,7 @@ def options_class(
 
 
 def flat(parsed: Any) -> SimpleNamespace:
-    """Return all options of a parsed `options_class` in one namespace."""
+    """Return the options of all groups of a parsed `options_class` in one namespace."""
     values = {}
     for name, value in vars(parsed).items():
         values |= vars(value) if is_dataclass(value) else {name: value}
@@ -187,12 +188,12 @@ def flat(parsed: Any) -> SimpleNamespace:
 
 
 def build(settings: Any, given: SimpleNamespace, **own: Any) -> Any:
-    """Return an object of a dataclass of settings, made from the options; see `option_fields`.
+    """Build a dataclass of settings from parsed options; `option_fields` made the options from its fields.
 
     Args:
         settings: the dataclass.
-        given: parsed options; those that are None, or not there, keep the defaults of the dataclass.
-        own: fields that the options do not give as they are.
+        given: parsed options; a field whose option is None or missing keeps the default of the dataclass.
+        own: field values that override the options.
     """
     values = dict(own)
     for member in fields(settings):
@@ -216,7 +217,7 @@ def build(settings: Any, given: SimpleNamespace, **own: Any) -> Any:
 
 
 def controller(given: SimpleNamespace, name: str) -> Controller:
-    """Return a controller by name, with the order, model variant and feedback that the options ask for."""
+    """Load a controller by name, and apply the options --order, --model-variant and --feedback."""
     from dataclasses import replace
 
     from hexmj.controllers.registry import load_controller
@@ -227,7 +228,7 @@ def controller(given: SimpleNamespace, name: str) -> Controller:
 
         if not isinstance(found, Cruse1998):
             option = next(iter(rules)).replace("_", "-")
-            raise InputError(f"--{option} has no effect on {name}; only the 1998 network has it")
+            raise InputError(f"--{option} has no effect on {name}; it changes only the 1998 network")
         found = replace(found, **rules)
     if getattr(given, "feedback", False):
         from hexmj.controllers.feedback import SensoryFeedback
@@ -237,7 +238,7 @@ def controller(given: SimpleNamespace, name: str) -> Controller:
 
 
 def network_rules(given: SimpleNamespace) -> dict[str, Any]:
-    """Return the order of updates and the model variant of the 1998 network, as far as they are given."""
+    """Return the values of --order and --model-variant as fields of `Cruse1998`, without options that are not given."""
     rules = {}
     if getattr(given, "order", None):
         rules["order"] = given.order
@@ -249,27 +250,27 @@ def network_rules(given: SimpleNamespace) -> dict[str, Any]:
 
 
 def controllers(given: SimpleNamespace) -> dict[str, Controller]:
-    """Return several controllers by their own names, or by the given ones if two have the same."""
+    """Return the controllers of --controller by their attribute `name`, or as typed if two have the same `name`."""
     distinct("--controller", given.controller)
     found = [controller(given, name) for name in given.controller]
-    own = [one.name for one in found]
-    return dict(zip(own if len(set(own)) == len(own) else given.controller, found, strict=True))
+    names = [planner.name for planner in found]
+    return dict(zip(names if len(set(names)) == len(names) else given.controller, found, strict=True))
 
 
-def conditions(given: SimpleNamespace, usual: Conditions | None = None) -> Conditions:
-    """Return the conditions, with the defaults of a study."""
-    return Conditions(**(usual or Conditions()).values() | _given(Conditions, given))
+def conditions(given: SimpleNamespace, defaults: Conditions | None = None) -> Conditions:
+    """Return the conditions that the options set; a condition without an option has its value in `defaults`."""
+    return Conditions(**(defaults or Conditions()).values() | _given(Conditions, given))
 
 
 def stride(given: SimpleNamespace) -> Stride:
-    """Return the stride."""
+    """Return the stride that the options set."""
     values = _given(Stride, given)
     values["geometry"] = GEOMETRIES[values.get("geometry", "fig1")]
     return Stride(**values)
 
 
 def acceleration(given: SimpleNamespace) -> Acceleration | None:
-    """Return the accelerating procedure of Eq. 11, if walks accelerate."""
+    """Return the acceleration of Eq. 11 that the options set, or None without --acceleration."""
     if given.acceleration is None:
         if given.initial_velocity is not None:
             raise InputError(f"--initial-velocity = {given.initial_velocity:g} has no effect without --acceleration")
@@ -278,9 +279,12 @@ def acceleration(given: SimpleNamespace) -> Acceleration | None:
     return Acceleration(given.acceleration, start)
 
 
-def no_effect(given: SimpleNamespace, names: Collection[str], reason: str, usual: Mapping[str, Any] = {}) -> None:
-    """Raise InputError if an option was given that has no effect for a reason such as 'without --physical'."""
-    defaults = Conditions().values() | {"feedback": False} | dict(usual)
+def no_effect(given: SimpleNamespace, names: Collection[str], reason: str, more: Mapping[str, Any] = {}) -> None:
+    """Raise InputError if an option in `names` has no effect, for a `reason` such as "without --physical", but is set.
+
+    An option is set if it differs from its default; `more` holds defaults of options that are no conditions.
+    """
+    defaults = Conditions().values() | {"feedback": False} | dict(more)
     for name in names:
         if (value := getattr(given, name, defaults[name])) != defaults[name]:
             raise InputError(f"--{name.replace('_', '-')} = {value} has no effect {reason}")
@@ -291,19 +295,19 @@ def _given(settings: type, given: SimpleNamespace) -> dict[str, Any]:
     return {name: value for name, value in vars(given).items() if name in names}
 
 
-def _default(member: Any, usual: Any = MISSING) -> Any:
-    if usual is not MISSING:
-        return usual
+def _default(member: Any, replacement: Any = MISSING) -> Any:
+    if replacement is not MISSING:
+        return replacement
     return member.default if member.default_factory is MISSING else member.default_factory()
 
 
 def _member(option: Option, texts: Mapping[str, str], *markers: Any) -> Any:
-    """Return an option as `make_dataclass` takes it: name, annotated type and default."""
+    """Return an option as a field for `make_dataclass`: name, annotated type and default."""
     name, kind, default = option.name, option.kind, option.default
     if kind is Controller:
         kind, default = str, "ldvs" if default is MISSING else default
     elif kind is Geometry:
-        kind, default = Literal[*GEOMETRIES], next(one for one, lines in GEOMETRIES.items() if lines == default)
+        kind, default = Literal[*GEOMETRIES], next(key for key, lines in GEOMETRIES.items() if lines == default)
     elif name == "observation_time":
         kind = float | str
     optional = NoneType in get_args(kind)
@@ -321,21 +325,22 @@ def _member(option: Option, texts: Mapping[str, str], *markers: Any) -> Any:
     metavar = f"{metavar} ..." if several else metavar
     hint: Any = {"help_behavior_hint": ""} if default is None or default is False or default == () else {}
     hint |= {"metavar": f"[{metavar}]" if markers else metavar} if metavar else {}
-    made = field() if default is MISSING else field(default=default)
-    return name, Annotated[kind, arg(name=name.replace("_", "-"), help=text, **hint), *markers], made
+    described = Annotated[kind, arg(name=name.replace("_", "-"), help=text, **hint), *markers]
+    return name, described, field() if default is MISSING else field(default=default)
 
 
 def _texts(*settings: type) -> dict[str, str]:
-    """Return the docstrings of the attributes of dataclasses by name; later classes win."""
+    """Return option -> docstring of its field; if several dataclasses have the field, the last one counts."""
     texts: dict[str, str] = {}
-    for one in settings:
-        for base in reversed([base for base in one.__mro__ if is_dataclass(base)]):
+    for source in settings:
+        for base in reversed([base for base in source.__mro__ if is_dataclass(base)]):
             (tree,) = ast.parse(dedent(getsource(base))).body
             for statement, text in pairwise(getattr(tree, "body", [])):
                 match statement, text:
                     case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
                         texts[NAMES.get(name, name)] = " ".join(words.split())
     return {
-        "acceleration": "Accelerate from --initial-velocity with a of Eq. 11 [1 / time unit]; 0.00008 in the paper.",
-        "initial_velocity": "V_r(0) when accelerating, a fraction of V_p; 0.1 by default.",
+        "acceleration": "Acceleration a of Eq. 11 from --initial-velocity to --velocity [1 / time unit]; the paper's is"
+        " 0.00008. By default, walks do not accelerate.",
+        "initial_velocity": "V_r at the beginning of a walk with --acceleration, a fraction of V_p; by default 0.1.",
     } | texts

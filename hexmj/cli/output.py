@@ -11,13 +11,13 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 Column = str | Callable[["xr.Dataset"], str]
-"""A variable, or a function that returns the text of a cell from the data of its row."""
+"""Column of a table: name of a variable, or a function from the data of a row to the text of its cell."""
 
 HEADS = {"velocity": "V", "vp": "V_p", "leg_mass": "legs", "mechanism_name": "starts that"}
-"""Axis of a result -> its heading in tables."""
+"""Axis of a result -> its heading in tables, where it is not the axis's name."""
 
 GAP = 2
-"""Columns of the screen between those of a table."""
+"""Number of characters between two columns of a table."""
 
 
 def show(*parts: Any) -> None:
@@ -38,20 +38,20 @@ def print_json(value: dict[str, Any]) -> None:
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> "Table":
-    """Return a table; cells that are too wide for the screen are folded."""
+    """Return a table of texts; if it is wider than the screen, long cells continue on further lines."""
     from rich import box
     from rich.table import Table
 
-    made = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
+    screen = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
     for column in head:
-        made.add_column(column.replace("_", " "), overflow="fold")
+        screen.add_column(column.replace("_", " "), overflow="fold")
     for row in rows:
-        made.add_row(*row)
-    return made
+        screen.add_row(*row)
+    return screen
 
 
 def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iterator[Table]":
-    """Yield a table in one or several parts as wide as the screen, each with the first column."""
+    """Split a table by columns into parts that fit the width of the screen; each part repeats the first column."""
     from rich.console import Console
 
     width = Console().width
@@ -68,12 +68,12 @@ def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iter
 
 
 def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column] | Iterable[str]) -> "Table":
-    """Return a table with a row for each label of some axes.
+    """Return a table with one row for each combination of labels along some axes.
 
     Args:
         result: the data.
-        axes: the last one varies fastest.
-        columns: heading -> column; of names alone, each is its own heading.
+        axes: names of the axes; the last axis varies fastest.
+        columns: heading -> column, or names of variables that serve as headings.
     """
     columns = columns if isinstance(columns, Mapping) else {name: name for name in columns}
     rows = []
@@ -85,7 +85,7 @@ def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column
 
 
 def over_velocity(result: "xr.Dataset", text: Callable[["xr.Dataset"], str]) -> dict[str, Column]:
-    """Return columns for `grid`, one for each velocity."""
+    """Return a column for each velocity, for `grid`; `text` makes a cell from the data at the velocity."""
 
     def column(v: float) -> Column:
         return lambda data: text(data.sel(velocity=v))
@@ -94,7 +94,7 @@ def over_velocity(result: "xr.Dataset", text: Callable[["xr.Dataset"], str]) -> 
 
 
 def _text(data: "xr.Dataset", column: Column) -> str:
-    """Return a variable as text, with its interval if there is one."""
+    """Return the text of a cell; if `column` names a variable, its number and, if the data have it, its interval."""
     if not isinstance(column, str):
         return column(data)
     return interval(data, column) if f"{column}_low" in data else f"{data[column].item():.3f}"
@@ -113,29 +113,29 @@ def difference(data: "xr.Dataset", measure: str) -> str:
 
 
 def four_digits(value: float) -> str:
-    """Return a number with four digits, or a whole number if it has more."""
+    """Return a number with four significant digits; a number of 1000 or more is rounded to a whole number."""
     return f"{value:.0f}" if value >= 1000 else f"{value:.4g}"
 
 
 def lists_of(result: "xr.Dataset") -> dict[str, Any]:
-    """Return all coordinates and variables of a result as lists, and its settings, for JSON."""
+    """Return the coordinates and variables of a result as lists, and its settings, for the JSON answer."""
     from hexmj.io import settings
 
     return {str(name): result[name].values.tolist() for name in result.variables} | {"settings": settings(result)}
 
 
 def report_line(report: dict[str, float]) -> str:
-    """Return a report as one line."""
+    """Return the entries of a report as one line, `key: value` separated by semicolons."""
     return "; ".join(f"{key}: {value:{'.3g' if isinstance(value, float) else ''}}" for key, value in report.items())
 
 
 def report_checks(findings: Iterable[Any], json: bool, **beside: Any) -> NoReturn:
-    """Print the finding of each check as it comes, or one JSON object, and exit with 1 if one is not well.
+    """Print each finding as soon as its check ends, or one JSON object, and exit: code 0 if all checks pass, else 1.
 
     Args:
-        findings: frozen dataclasses with `name`, `well` and `found`, and perhaps `remedy` and `note`.
-        json: prints JSON.
-        beside: more members of the JSON object.
+        findings: dataclasses with `name`, `well` (passed) and `found`, and optionally `remedy` and `note`.
+        json: whether to print one JSON object instead of lines.
+        beside: further members of the JSON object.
     """
     checks = []
     for finding in findings:

@@ -1,4 +1,4 @@
-"""`hexmj reproduce`."""
+"""The command `hexmj reproduce`."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,15 +11,15 @@ from hexmj.cli.output import table
 
 @dataclass(frozen=True)
 class ReproduceOptions:
-    """Options of a reproduction."""
+    """Options of `hexmj reproduce` that `Reproduction` does not have."""
 
     out: Path = Path("results/reproduce")
     """Folder for the table (Markdown, JSON), the figures and cached measurements."""
 
 
 class Reproduce(Command):
-    """Reproduce Section 5 of the 1998 paper: every claim with our number and verdict, Figures 2 to 6, phase histograms
-    and footfall diagrams. A run that was stopped resumes if it is repeated."""
+    """Reproduce Section 5 of the 1998 paper: compare every claim with hexmj's number, and draw Figures 2 to 6, phase
+    histograms and footfall diagrams. Repeat the command to resume a stopped run."""
 
     sources = (ReproduceOptions, "paper.protocol:Reproduction", Output, Workers)
     examples = ("--quick", "--only hws-close p4 --beside lasting --json")
@@ -29,9 +29,9 @@ class Reproduce(Command):
         from hexmj.paper.reproduce import reproduce
         from hexmj.plotting import as_shipped
 
-        chosen = build(Reproduction, given)
+        plan = build(Reproduction, given)
         with at_work(given, "reproducing") as execution, as_shipped():
-            report = reproduce(given.out, chosen.protocol, chosen.only, chosen.beside, **execution)
-        settings = {"protocol": asdict(report.protocol), "only": chosen.only, "beside": chosen.beside}
+            report = reproduce(given.out, plan.protocol, plan.only, plan.beside, **execution)
+        settings = {"protocol": asdict(report.protocol), "only": plan.only, "beside": plan.beside}
         lines = ["The claims of the 1998 paper", table(*report.table()), *report.summary]
         return Answer(report.json(), lines, report.files, settings)

@@ -23,28 +23,29 @@ if TYPE_CHECKING:
     from hexmj.replay.recording import Start
 
 WALKS: dict[str, Any] = {"controller": "ldvs", "velocity": 0.3, "seed": 0, "start": 0, "beside": None}
-"""Defaults of options that have no effect on recordings."""
+"""Option that has no effect on recordings -> its default."""
 
-END = "Ctrl-C ends it."
+END = "Press Ctrl-C to stop."
 
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """Options of a video."""
+    """Options of `hexmj render` that `Start` and `Film` do not have."""
 
     recordings: tuple[Path, ...] = ()
-    """One recording, or up to six side by side (recording.nc of `hexmj walk`); without any, a physical walk is recorded
-    first."""
+    """One to six recordings (recording.nc of `hexmj walk`), shown side by side; without a recording, a physical walk is
+    recorded first."""
     out: Path = Path("results/render")
     """Folder for the video and new recordings."""
     beside: str | None = None
-    """Show side by side, from the same start: 'planned' (the plan with its support polygon) or a second controller."""
+    """Show beside the walk, from the same start: 'planned' (the plan with its support polygon) or the walk of a second
+    controller, given by name."""
     format: Literal["mp4", "gif"] = "mp4"
     """Format of the video."""
 
 
 class Render(Command):
-    """Render a gait video, from recordings or from a walk that is recorded first."""
+    """Render a video of recordings, or of a physical walk that is recorded first."""
 
     sources = (RenderOptions, "replay.recording:Start", Output, Film, Planning, Threads)
     positional = "recordings"
@@ -65,10 +66,10 @@ class Render(Command):
         shown = [load_recording(path) for path in given.recordings]
         start = None if shown else build(Start, given)
         if start and given.beside not in (None, "planned"):
-            controller(given, given.beside)  # raises before the work
+            controller(given, given.beside)  # raises for an unknown name before the walk
         out = results_folder(given.out)
-        if sentence := missing():
-            raise RenderingError(sentence)
+        if reason := missing():
+            raise RenderingError(reason)
         settings: dict[str, Any] = {"film": asdict(film)}
         files: list[Path] = []
         name = _file_name(given, film, [walked.attrs["title"] for walked in shown])
@@ -84,7 +85,7 @@ class Render(Command):
 
 
 def _recorded(start: "Start", given: SimpleNamespace) -> "list[xr.Dataset]":
-    """Return the recordings of the walk and of what is shown beside it."""
+    """Record the walk, and the plan or the walk of the second controller that --beside asks for."""
     from hexmj.replay.recording import Start, record, record_plan
 
     name, walked = start.controller.name, start.walked(given.threads)
@@ -98,7 +99,7 @@ def _recorded(start: "Start", given: SimpleNamespace) -> "list[xr.Dataset]":
 
 
 def _file_name(given: SimpleNamespace, film: Film, titles: Sequence[str]) -> str:
-    """Return the name of the video's file, which says what it shows."""
+    """Return the name of the video's file without its suffix, made from the titles of its recordings and the camera."""
     titles = titles or [f"{given.controller} V {given.velocity:g}", given.beside or ""]
     camera = "" if film.camera == Film.camera else f" {film.camera}"
     words = " beside ".join(filter(None, titles))[:120] + camera
@@ -107,17 +108,17 @@ def _file_name(given: SimpleNamespace, film: Film, titles: Sequence[str]) -> str
 
 @dataclass(frozen=True)
 class PageOptions:
-    """Options of a page."""
+    """Options of `hexmj page`."""
 
     recordings: tuple[Path, ...] = ()
-    """One recording, or two side by side with one clock (recording.nc of `hexmj walk`)."""
+    """One recording (recording.nc of `hexmj walk`), or two that play side by side at the same time."""
     out: Path = Path("results/page")
     """Folder for the page."""
 
 
 class Page(Command):
-    """Write one HTML file that plays a recording, or two side by side: 3D, footfall diagram and stability margin. It
-    needs no network."""
+    """Write one HTML file that plays one recording, or two side by side, in 3D with footfall diagram and stability
+    margin. The file works without a network."""
 
     sources = (PageOptions, Output)
     positional = "recordings"
@@ -133,14 +134,14 @@ class Page(Command):
         shown = [load_recording(path) for path in given.recordings]
         file = page(shown, results_folder(given.out) / "walk.html")
         settings = {"recordings": [str(path) for path in given.recordings]}
-        line = f"{file.stat().st_size / 1e6:.1f} MB; opens in any browser"
+        line = f"{file.stat().st_size / 1e6:.1f} MB; open the file in any browser"
         summary = {"recordings": [*map(recording_summary, shown)]}
         return Answer(summary, [line], [file], settings, f"{file.name}-{MANIFEST}")
 
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """Options of a view."""
+    """Options of `hexmj view`."""
 
     controller: Controller
     recording: Path | None = None
@@ -150,13 +151,13 @@ class ViewOptions:
     seed: int = 0
     """Seed of the random starts."""
     start: int = 0
-    """Number of the first start."""
+    """Number of the first start among the random starts of the seed."""
     browser: bool = False
-    """Use a browser although there is a screen."""
+    """Show the view in a browser even if there is a screen."""
     host: str = "127.0.0.1"
-    """Address of the browser's page; with 0.0.0.0 other machines can view and steer too."""
+    """Address of the browser's page; with 0.0.0.0, other machines can also view and steer the insect."""
     port: int = 8080
-    """Port of the browser's page; 0 takes a free one."""
+    """Port of the browser's page; 0 chooses a free port."""
     conditions: Conditions = Conditions()
 
 
@@ -192,7 +193,7 @@ class View(Command):
 
         planned = controller(given, given.controller)
         if not desktop:
-            check_port(given.host, given.port)  # before the insect settles
+            check_port(given.host, given.port)  # raises before the insect settles
         with progress_bar("settling"):
             walk = LiveWalk(planned, given.velocity, starts(given.start), conditions(given))
         session = LiveSession(walk, given.start, starts)
@@ -209,7 +210,7 @@ class View(Command):
             view.run()
 
     def recording(self, given: SimpleNamespace, desktop: bool) -> None:
-        """Play a recording again and again."""
+        """Play a recording in an endless loop."""
         from hexmj.replay.recording import load_recording
 
         recording = load_recording(given.recording)

@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-SAME = {
+AGREEMENT = {
     "measured": "agreement_measured",
     "grounded": "agreement_grounded",
     "physical": "agreement",
     "same feet": "same_feet",
     "at the ground": "same_feet_grounded",
 }
-"""Heading -> the fraction of starts with the kinematic answer, or of steps in which the planned feet stand."""
+"""Heading -> variable: fraction of starts with the same outcome as in the plan, or of steps with the planned stance."""
 
-OFF = {
+DEVIATION = {
     "margin": "margin",
     "grounded": "margin_grounded",
     "pressure": "margin_pressure",
@@ -32,12 +32,12 @@ OFF = {
     "slip": "slip",
     "tracking": "tracking",
 }
-"""Heading -> the distance of the walk from its plan."""
+"""Heading -> variable: a distance between the walk and its plan."""
 
 
 class Map(StudyCommand):
-    """Map the physical FLSS over the velocity and one condition, with the mechanisms by which starts fall or do not. A
-    run that was stopped resumes if it is repeated."""
+    """Map the physical FLSS over the velocity and one condition, and count the mechanisms that make starts fall or keep
+    them from falling. Repeat the command to resume a stopped run."""
 
     study = "studies.stability_map:StabilityMap"
     hidden = ("feedback",)
@@ -62,8 +62,8 @@ class Map(StudyCommand):
         froude = {"Froude": lambda data: f"{data.froude.item():.2g}"}
         yield grid(result, ("value", "velocity"), froude | {name: name for name in MEASURES})
         yield (
-            "Saved: of the starts with a static loss, those that do not fall; dynamics: physical less static FLSS;"
-            f" change: physical FLSS less that at {study.over} = {result.attrs['reference']:g}"
+            "Saved: fraction of the starts with a static loss that do not fall; dynamics: physical minus static FLSS;"
+            f" change: physical FLSS minus physical FLSS at {study.over} = {result.attrs['reference']:g}"
         )
         yield grid(result, ("value", "velocity"), saved | changes)
         yield f"Mechanisms: numbers of starts at each {study.over}"
@@ -73,8 +73,8 @@ class Map(StudyCommand):
         yield grid(toppled, ("velocity",), counts)
         stand = (f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True))
         yield (
-            f"{result.sizes['start']} of {study.n_starts} starts, which stand on six feet and reach nine of ten tips at"
-            f" every value ({', '.join(stand)})"
+            f"{result.sizes['start']} of {study.n_starts} starts are counted: they stand on six feet and reach at least"
+            f" nine of ten tips at every value ({', '.join(stand)})"
         )
 
 
@@ -87,8 +87,8 @@ def _count(value: float) -> Column:
 
 
 class Disturb(StudyCommand):
-    """Disturb walks by a halt, a stopped leg or a push, and measure what three strategies gain, kinematically and
-    physically. A run that was stopped resumes if it is repeated."""
+    """Disturb walks by a halt, a stopped leg or a push, and measure how much three strategies reduce the kinematic and
+    physical FLSS. Repeat the command to resume a stopped run."""
 
     study = "studies.disturbance:DisturbedWalks"
     data = "disturb.nc"
@@ -102,35 +102,36 @@ class Disturb(StudyCommand):
             if measure in result:
                 yield from _disturbed(result, measure)
         if {*result.strategy.values} - {"none"}:
-            yield "takes off: how much lower than without a strategy, on the same starts"
+            yield "Reduction: FLSS without a strategy minus FLSS with it, on the same starts"
         found = (f"{n} at V = {v:g}" for n, v in zip(result.drawn.values, result.velocity.values, strict=True))
-        yield f"{study.n_starts} starts whose plan is stable until it is disturbed, the first of {', '.join(found)}"
+        yield f"{study.n_starts} starts whose plan is stable until the disturbance; starts drawn: {', '.join(found)}"
         if words := strategies_in_words(result):
             yield words
 
 
 def _disturbed(result: "xr.Dataset", measure: str) -> "Iterable[str | Table]":
-    """Yield the FLSS by one measure and what the strategies take off it, each under its heading."""
+    """Yield headings and tables for one measure of FLSS: its values, and how much the strategies reduce it."""
     strategy, kinds = result.strategy.values, [name.partition(" ")[0] for name in result.disturbance.values]
     kinematic = [kind != "push" and answer != "grasp" for kind, answer in zip(kinds, strategy, strict=True)]
-    cases = [n for n, either in enumerate(kinematic) if either or measure == "physical"]
+    cases = [n for n, planned in enumerate(kinematic) if planned or measure == "physical"]
     answered, slow = ([n for n in cases if strategy[n] != "none"], [n for n in cases if strategy[n] == "slow_down"])
     yield (
         f"{measure} FLSS after the disturbance, of at least {result[f'{measure}_reached'].min().item()} starts, with"
-        " 95 % intervals" + ("; the observation time begins at full velocity again" if slow else "")
+        " 95 % intervals"
+        + ("; counted until one observation time after full velocity is reached again" if slow else "")
     )
     whole = result.sel(observation_time="whole")
     yield _cases(whole.isel(case=cases), measure, interval)
     if slow:
-        yield "The same if the observation time begins with the disturbance"
+        yield f"{measure} FLSS counted until one observation time after the disturbance"
         yield _cases(result.sel(observation_time="short").isel(case=slow), measure, interval)
     if answered:
-        yield f"What a strategy takes off the {measure} FLSS"
+        yield f"Reduction of the {measure} FLSS by a strategy"
         yield _cases(whole.isel(case=answered), f"{measure}_buys", difference)
 
 
 def _cases(result: "xr.Dataset", name: str, text: "Callable[[xr.Dataset, str], str]") -> "Table":
-    """Return a table with a row for each case, and a column for each velocity."""
+    """Return a table with a row for each disturbance and strategy (case), and a column for each velocity."""
     columns = {"disturbance": lambda data: data.disturbance.item(), "strategy": _strategy}
     columns |= over_velocity(result, lambda data: text(data, name))
     rows = [[column(result.isel(case=case)) for column in columns.values()] for case in range(result.sizes["case"])]
@@ -142,8 +143,8 @@ def _strategy(data: "xr.Dataset") -> str:
 
 
 class Terrain(StudyCommand):
-    """Measure how often the insect falls once it has reached a step, a gap, a hurdle or rough ground. A run that was
-    stopped resumes if it is repeated."""
+    """Measure how often the insect falls after it has reached a step, a gap, a hurdle or rough ground. Repeat the
+    command to resume a stopped run."""
 
     study = "studies.terrain:Terrain"
     data = "terrain.nc"
@@ -161,14 +162,14 @@ class Terrain(StudyCommand):
 
         columns = over_velocity(result, partial(interval, measure="flss"))
         columns["crossed"] = lambda data: f"{data.crossed.sum().item()} of {data.reached.sum().item()}"
-        yield "FLSS once the obstacle has been reached, with 95 % intervals; earlier falls do not count"
+        yield "FLSS after the obstacle has been reached, with 95 % intervals; earlier falls do not count"
         yield grid(result, ("obstacle", "grasp"), columns | {"fell on": fell_on})
         yield f"commanded distance {result.attrs['distance']:g} mm"
 
 
 class Converge(StudyCommand):
-    """Walk from the same starts at smaller and smaller V_p: the insect approaches its plan, and physical stability the
-    static criterion. A run that was stopped resumes if it is repeated."""
+    """Walk the same starts at decreasing V_p, where the body follows its plan more closely and physical stability
+    converges to the static criterion. Repeat the command to resume a stopped run."""
 
     study = "studies.static_limit:StaticLimit"
     data = "converge.nc"
@@ -184,14 +185,14 @@ class Converge(StudyCommand):
         means, axes = _means(result), ("leg_mass", "vp")
         yield f"V = {study.velocity:g}: FLSS, with 95 % intervals; physical: falls"
         yield grid(means, axes, [*LOSSES])
-        yield "Starts with the kinematic answer; steps in which the planned feet stand, or are at the ground"
-        yield grid(means, axes, SAME)
+        yield "Fraction of starts with the same outcome as in the plan; fraction of steps with the planned stance"
+        yield grid(means, axes, AGREEMENT)
         yield (
-            "Distances from the planned margin until the plan loses stability: of the measured one, of that with all"
-            " feet at the ground, of the centre of pressure's, of the measured one while the same feet stand; of the"
-            " centre of mass from O [mm]; slip [mm/s] and tracking [mm] to the end"
+            "Mean distance [mm] from the planned margin until the plan loses stability, of four margins: measured, with"
+            " all feet at the ground (grounded), of the centre of pressure, measured while the planned feet stand (same"
+            " feet); drift of the centre of mass from O [mm]; slip [mm/s] and tracking [mm] of the whole walk"
         )
-        yield grid(means, axes, OFF)
+        yield grid(means, axes, DEVIATION)
 
 
 def _means(result: "xr.Dataset") -> "xr.Dataset":
@@ -202,8 +203,8 @@ def _means(result: "xr.Dataset") -> "xr.Dataset":
 
 
 class Biology(StudyCommand):
-    """Compare forces, torques, gait, posture and work of the walking insect with those of measured insects. A run that
-    was stopped resumes if it is repeated."""
+    """Compare forces, torques, gait, posture and work of the simulated insect with measurements of real insects. Repeat
+    the command to resume a stopped run."""
 
     study = "studies.biology:Biology"
     data = "biology.nc"
@@ -216,11 +217,11 @@ class Biology(StudyCommand):
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.studies.biology import HEADS, table_rows, walked_in_words
 
-        yield f"{study.controller.name} beside insects, at 24 mm/s unless another speed is given"
+        yield f"{study.controller.name} and real insects, at 24 mm/s unless a row names another speed"
         yield table(HEADS, table_rows(result))
-        yield f"starts with whole strides: {walked_in_words(result)}; sources in biology.md"
+        yield f"Starts with complete strides: {walked_in_words(result)}. biology.md names the sources."
 
-    def others(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
+    def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
         from hexmj.files import write_text
         from hexmj.studies.biology import biology_markdown
 
