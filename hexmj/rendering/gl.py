@@ -12,7 +12,7 @@ PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
 
 
 class Renderer(mujoco.Renderer):
-    """MuJoCo's renderer, which frees its textures in its own OpenGL context, not in the last one used."""
+    """MuJoCo's renderer, except that `close` frees the textures in the renderer's own OpenGL context."""
 
     def __init__(self, model: mujoco.MjModel, height: int, width: int) -> None:
         """Prepare frames of height x width pixels.
@@ -25,14 +25,14 @@ class Renderer(mujoco.Renderer):
         super().__init__(model, height, width)
 
     def close(self) -> None:
-        """Free the renderer; it may be called again."""
+        """Free the renderer's resources; further calls have no effect."""
         if self._gl_context:
             self._gl_context.make_current()
         super().close()
 
 
 def missing() -> str | None:
-    """Return why nothing can be rendered on this machine and what to install, or None."""
+    """Return why this machine cannot render and what to install; None if it can."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # GLFW only warns if there is no display, and makes no context
@@ -44,6 +44,6 @@ def missing() -> str | None:
     except Exception as error:  # OpenGL libraries and drivers raise errors of their own types
         reason = textwrap.shorten(str(error) or type(error).__name__, 160, placeholder=" [...]").rstrip(".")
     return (
-        f"Nothing can be rendered here ({reason}). Without a display, set MUJOCO_GL=egl; on Debian and Ubuntu it needs"
+        f"This machine cannot render ({reason}). Without a display, set MUJOCO_GL=egl; on Debian and Ubuntu, EGL needs"
         f" the packages {PACKAGES}."
     )

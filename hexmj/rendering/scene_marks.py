@@ -9,10 +9,10 @@ from hexmj.body import Marks
 
 STABLE = (0.05, 0.55, 0.32)
 UNSTABLE = (0.84, 0.24, 0.02)
-"""Colours of the support polygon: red, green, blue from 0 to 1. An unstable one is also empty, with a thick outline."""
+"""Red, green and blue from 0 to 1 of support polygons; an unstable polygon is also unfilled, with a thick outline."""
 
 STRONGER = 1.8
-"""Thickness of the outline of an unstable polygon, relative to a stable one."""
+"""Thickness of the outline of an unstable support polygon / that of a stable one."""
 
 CENTRE = (0.98, 0.72, 0.10)
 TIP = (0.13, 0.36, 0.72)
@@ -22,7 +22,7 @@ EMISSION = 0.3
 
 
 def mark_support(scene: mujoco.MjvScene, marks: Marks, corners: np.ndarray, level: float, stable: bool) -> None:
-    """Mark the support polygon by its corners in order, (corner, 2), at the level of the ground [mm]."""
+    """Mark the support polygon with the corners `corners`, (corner, 2), in order, at the height `level` [mm]."""
     colour = STABLE if stable else UNSTABLE
     points = np.column_stack([corners, np.full(len(corners), level + marks.fill_height)])
     for second, third in pairwise(points[1:]) if stable else ():
@@ -33,7 +33,7 @@ def mark_support(scene: mujoco.MjvScene, marks: Marks, corners: np.ndarray, leve
 
 
 def mark_centre_of_mass(scene: mujoco.MjvScene, marks: Marks, centre: np.ndarray, level: float, stable: bool) -> None:
-    """Mark the centre of mass, (3,), and its projection on the level of the ground [mm]."""
+    """Mark the centre of mass `centre`, (3,), and its projection at the height `level` [mm]."""
     below = np.array([centre[0], centre[1], level])
     _rod(scene, below, centre, marks.plumb_line, (*CENTRE, 0.8))
     rim = (*(STABLE if stable else UNSTABLE), 1.0)
@@ -57,7 +57,7 @@ def _disc(scene: mujoco.MjvScene, centre: np.ndarray, radius: float, height: flo
 
 
 def _triangle(scene: mujoco.MjvScene, a: np.ndarray, b: np.ndarray, c: np.ndarray, rgba: tuple) -> None:
-    """Add a triangle; MuJoCo's has corners at 0, at size_x on the frame's x axis and at size_y on its y axis."""
+    """Add a triangle. MuJoCo places its corners at 0, at size_x on the frame's x axis and at size_y on the y axis."""
     sides = np.stack([b - a, c - a])
     lengths = np.linalg.norm(sides, axis=1)
     x, y = sides / lengths[:, None]

@@ -1,4 +1,4 @@
-"""The visible parts of a compiled body and of its ground as triangles."""
+"""Triangles of the visible parts of a compiled body and of its ground."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -10,33 +10,33 @@ from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.ground import BUMPS, ground_level
 
 AROUND, RINGS = 14, 4
-"""Corners around a round geom, and rings of each of its ends."""
+"""Number of corners on each ring around a round geom (AROUND), and of rings on each of its two ends (RINGS)."""
 
 UNSET_COLOUR = (0.5, 0.5, 0.5, 1.0)
 """Colour of a geom without a colour of its own."""
 
 VISIBLE_GROUPS = 3
-"""Number of the first groups of geoms, which MuJoCo's renderer shows."""
+"""Geoms of the groups below this number are visible, as in MuJoCo's renderer."""
 
 PER_BUMP = 8
-"""Points of the ground's surface from one bump to the next."""
+"""Number of points on the ground's surface from one bump to the next."""
 
 KINDS = mujoco.mjtGeom
 
 
 class Shape(NamedTuple):
-    """Triangles; each belongs to a body."""
+    """Triangles whose corners belong to bodies of a MuJoCo model."""
 
     corners: np.ndarray
     """(corner, 3) in the frame of its body [mm]."""
     normals: np.ndarray
-    """(corner, 3) of unit length."""
+    """(corner, 3) outward normals of unit length in the frame of the body."""
     faces: np.ndarray
-    """(face, 3) corners, counter-clockwise seen from outside."""
+    """(face, 3) indices of the corners, counter-clockwise seen from outside."""
     colour: np.ndarray
     """(corner, 3) red, green, blue from 0 to 1."""
     body: np.ndarray
-    """(corner,) number of the body."""
+    """(corner,) MuJoCo's index of the body."""
 
 
 def body_shapes(model: mujoco.MjModel) -> list[Shape]:
@@ -46,7 +46,7 @@ def body_shapes(model: mujoco.MjModel) -> list[Shape]:
 
 
 def ground_shape(compiled: CompiledBody) -> Shape:
-    """Return the shape of the obstacles on the plane or ahead of the feet, without the plane."""
+    """Return the shape of the obstacles, which are boxes or rough ground, without the flat plane."""
     model, conditions = compiled.model, compiled.conditions
     boxes = (i for i in range(model.ngeom) if not model.geom_bodyid[i] and model.geom_type[i] == KINDS.mjGEOM_BOX)
     shapes = [geom_shape(model, i) for i in boxes]
@@ -87,7 +87,7 @@ def geom_shape(model: mujoco.MjModel, geom: int) -> Shape:
 
 
 def _surface(places: np.ndarray, height: np.ndarray) -> Shape:
-    """Return the ground at places on a grid, (i, j, 2), where its height, (i, j), is above 0 [mm]."""
+    """Return the surface of heights (i, j) over grid points (i, j, 2) [mm], without faces at height 0."""
     corners = np.concatenate([places, height[..., None]], axis=-1).reshape(-1, 3)
     slopes = np.gradient(height, places[:, 0, 0], places[0, :, 1])
     normals = np.stack([-slopes[0], -slopes[1], np.ones_like(height)], axis=-1).reshape(-1, 3)
@@ -98,13 +98,13 @@ def _surface(places: np.ndarray, height: np.ndarray) -> Shape:
 
 
 def _rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """Colour as MuJoCo draws it: that of the material if the geom has none of its own."""
+    """Return the colour that MuJoCo draws: the geom's own, or the material's if the geom has no own colour."""
     material, own = model.geom_matid[geom], model.geom_rgba[geom]
     return model.mat_rgba[material] if material >= 0 and (own == UNSET_COLOUR).all() else own
 
 
 def _round(kind: mujoco.mjtGeom, size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, normals and faces of a geom that is round about its z axis: a profile (radius, z), turned."""
+    """Return corners, normals and faces of a solid of revolution: a profile (radius, z) turned about the z axis."""
     rise = np.linspace(-np.pi / 2, 0.0, RINGS + 1)
     if kind == KINDS.mjGEOM_CYLINDER:
         radius, z = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 0.0]), np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
@@ -118,7 +118,7 @@ def _round(kind: mujoco.mjtGeom, size: np.ndarray) -> tuple[np.ndarray, np.ndarr
     angle = np.linspace(0.0, 2 * np.pi, AROUND + 1)
 
     def turned(out: np.ndarray, up: np.ndarray) -> np.ndarray:
-        """Turn a profile, (ring,) outwards and upwards, about the z axis, (ring, corner, 3)."""
+        """Turn a profile with radial and z components, (ring,) each, about the z axis, (ring, corner, 3)."""
         return np.stack(
             np.broadcast_arrays(np.outer(out, np.cos(angle)), np.outer(out, np.sin(angle)), up[:, None]), -1
         )
@@ -130,14 +130,14 @@ def _round(kind: mujoco.mjtGeom, size: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _lattice(rows: int, columns: int) -> np.ndarray:
-    """Two triangles for each cell of a grid of corners, (face, 3)."""
+    """Return two triangles for each cell of a grid of corners, (face, 3) indices of corners."""
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     halves = [first, first + columns, first + 1], [first + 1, first + columns, first + columns + 1]
     return np.concatenate([np.stack(half, axis=1) for half in halves])
 
 
 def _box(size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, normals and faces of a box by its half sizes."""
+    """Return corners, normals and faces of a box with half sizes `size`, (3,) [mm]."""
     square, sides = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]), [(a, side) for a in range(3) for side in (-1, 1)]
     corners = [np.roll(np.column_stack([np.full(4, side), square[::side]]), a, axis=1) for a, side in sides]
     normals = [np.tile(side * np.eye(3)[a], (4, 1)) for a, side in sides]
@@ -146,7 +146,7 @@ def _box(size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners, normals and faces of a mesh; corners with different normals are different corners."""
+    """Return corners, normals and faces of a mesh; a point with several normals becomes several corners."""
     rows = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
     pairs = np.stack([model.mesh_face[rows], model.mesh_facenormal[rows]], axis=-1).reshape(-1, 2)
     distinct, faces = np.unique(pairs, axis=0, return_inverse=True)

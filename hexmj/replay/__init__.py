@@ -1,1 +1,1 @@
-"""What a walk leaves behind: recordings, their figures and films."""
+"""Recordings of walks, and the figures, films and pages that show them."""

@@ -11,10 +11,10 @@ from hexmj.errors import InputError, RenderingError
 from hexmj.validate import choice, number, whole
 
 MOST_PANELS = 6
-"""Most recordings in one film."""
+"""Maximum number of recordings in one film."""
 
 FASTEST_GIF = 50
-"""Most frames per second of a GIF: it counts hundredths of a second, and players show one hundredth as ten."""
+"""Maximum frames per second of a GIF. It stores times in 1/100 s, and players show frames of 1/100 s for 10/100 s."""
 
 ENCODINGS: dict[str, dict[str, Any]] = {
     ".mp4": {"crf": 20, "ffmpeg_args": "-preset veryfast -movflags +faststart"},
@@ -32,17 +32,17 @@ class Film:
     """
 
     camera: str = "following"
-    """One of `Body.cameras`: following, side, top, front of the stick insect."""
+    """Camera of the body; the stick insect has following, side, top and front."""
     width: int = 640
-    """Width of a panel [pixels], even."""
+    """Width of the picture of one recording [pixels], an even number."""
     height: int = 480
-    """Height of a panel [pixels], even."""
+    """Height of the picture of one recording [pixels], an even number."""
     fps: float = 30.0
-    """Frames per second of play."""
+    """Frames per second."""
     slow_motion: float = 2.0
-    """Play time over physical time: 2 plays at half speed."""
+    """Factor by which the film is slower than the walk: 2 plays at half speed."""
     quality: Literal["fast", "high"] = "fast"
-    """'fast': no shadows, reflections or multisampling; 'high': all of them."""
+    """'fast' renders without shadows, reflections and multisampling; 'high' renders with them."""
 
     def __post_init__(self) -> None:
         for name, most in (("width", 1920), ("height", 1080)):
@@ -54,17 +54,17 @@ class Film:
         choice("quality", self.quality, ("fast", "high"))
 
     def check_format(self, name: str) -> None:
-        """Raise InputError if the film has more frames per second than a format allows: "mp4" or "gif"."""
+        """Raise InputError if the film has more frames per second than the format `name`, "mp4" or "gif", allows."""
         if name == "gif" and self.fps > FASTEST_GIF:
             raise InputError(f"fps = {self.fps:g}; a GIF has at most {FASTEST_GIF} frames per second")
 
 
 def write_film(path: Path, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Encode frames, (height, width, 3) of bytes each, of even height and width, as a new film.
+    """Encode frames as a film and write its file.
 
     Args:
-        path: of the film, with a suffix of `ENCODINGS`.
-        frames: in their order.
+        path: file of the film, with a suffix of `ENCODINGS`.
+        frames: arrays (height, width, 3) of uint8, with even height and width.
         fps: frames per second.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Overlay of a film: a caption above, a scale, and a footfall diagram that grows below."""
+"""Overlay on the frames of a film: a caption at the top, a scale bar, and a growing footfall diagram at the bottom."""
 
 from functools import cache
 from pathlib import Path
@@ -14,22 +14,22 @@ from hexmj.replay.take import Take, margin_in_words
 
 INK, FAINT, PAPER, SHADE = (24, 26, 28), (120, 124, 126), (250, 250, 247), (222, 222, 217)
 GREEN, RED = (0, 112, 72), (190, 56, 0)
-"""Colours of stable and unstable postures, whose signs and texts differ too."""
+"""Text colours of stable (green) and unstable (red) postures. Their symbols and words differ too."""
 
 MINUS, TIMES = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 
 CAPTION, DIAGRAM = 48, 80
-"""Heights on a frame of 640 x 480 pixels, to which all sizes here refer. The insect's cameras keep them free."""
+"""Heights on a frame of 640 x 480 pixels, as all sizes in this file. The body's cameras keep these areas free."""
 
 BAR = 110
-"""Longest bar of the scale [pixels]."""
+"""Maximum length of the scale bar, on a frame of 640 x 480 pixels [pixels]."""
 
 
 class Overlay:
-    """Caption and diagram of one take, for frames of one size."""
+    """Draws caption, scale bar and footfall diagram of one take on frames of one size."""
 
     def __init__(self, take: Take, film: Film, begin: float, end: float) -> None:
-        """Draw the whole diagram once, on an axis from `begin` to `end` [s]."""
+        """Draw the complete diagram in advance, with a time axis from `begin` to `end` [s]."""
         self._take, self._begin, self._end, width, height = take, begin, end, film.width, film.height
         self._speed = "in real time" if film.slow_motion == 1 else f"at {1 / film.slow_motion:.2g} {TIMES} speed"
         self._scale = min(width / 640, height / 480)
@@ -39,13 +39,13 @@ class Overlay:
         self._full = self._bars(self._blank.copy())
 
     def draw(self, frame: np.ndarray, row: int, seconds: float, scale: float) -> None:
-        """Draw on a frame of the scene.
+        """Draw on a frame that shows the walk.
 
         Args:
             frame: (height, width, 3), changed in place.
-            row: step whose end is shown.
-            seconds: on the clock [s].
-            scale: at the centre of mass [pixels/mm]; 0 if it is not ahead of the camera.
+            row: index of the step at whose end the frame shows the body.
+            seconds: time of the frame on the time axis of the diagram [s].
+            scale: pixels per mm at the centre of mass; 0 if the centre of mass is behind the camera.
         """
         now, cursor = self._column(seconds), self._pixels(1)
         diagram = frame[self._bottom :]
@@ -57,7 +57,7 @@ class Overlay:
         strip[:] = self._strip(strip, scale)
 
     def _strip(self, background: np.ndarray, scale: float) -> np.ndarray:
-        """Draw the scale, a bar of a round length at the centre of mass, and the legend of the diagram."""
+        """Return `background` with a scale bar of a round length at the centre of mass, and the diagram's legend."""
         image, font, edge = Image.fromarray(background), _font(self._pixels(11)), self._pixels(10)
         draw, middle = ImageDraw.Draw(image), image.height // 2
         if scale > 0:
@@ -74,7 +74,7 @@ class Overlay:
         return np.asarray(image)
 
     def _caption(self, background: np.ndarray, row: int, seconds: float) -> np.ndarray:
-        """Draw title and state in the first line; time, velocities and margin in the second."""
+        """Return `background` with title and state in the first line, and time, velocities and margin in the second."""
         take, edge = self._take, self._pixels(10)
         bold, plain = _font(self._pixels(15), bold=True), _font(self._pixels(12))
         image = Image.blend(Image.fromarray(background), Image.new("RGB", background.shape[1::-1], PAPER), 0.8)
@@ -96,7 +96,7 @@ class Overlay:
         return np.asarray(image)
 
     def _state(self, row: int, seconds: float) -> tuple[str, tuple[int, int, int]]:
-        """Return the state of the body as a text, and its colour."""
+        """Return a text on the state of the body (stable, unstable, fallen), and the colour of the text."""
         take, lost = self._take, f"{1000 * self._take.lost:.0f} ms"
         if seconds >= take.fell:
             return f"■ fell on {take.part} at {1000 * take.fell:.0f} ms", RED
@@ -107,14 +107,14 @@ class Overlay:
         return f"● stable, but lost at {lost}" if seconds >= take.lost else "● stable", GREEN
 
     def _outside(self, seconds: float) -> str:
-        """Return a text for times before or after the recording, as beside a longer one; otherwise ""."""
+        """Return when the recording begins and ends if the time is outside it, as beside a longer one; else ""."""
         take = self._take
         if take.begin - take.step / 2 <= seconds <= take.end + take.step / 2:
             return ""
         return f"recorded from {1000 * take.begin:.0f} to {1000 * take.end:.0f} ms"
 
     def _axes(self, width: int, height: int) -> np.ndarray:
-        """Return the diagram without bars, (height, width, 3)."""
+        """Return the diagram with its labels and without bars, (height, width, 3)."""
         image = Image.new("RGB", (width, height), PAPER)
         draw, font, label = ImageDraw.Draw(image), _font(self._pixels(10)), self._left - self._pixels(6)
         for leg, name in enumerate(LEGS):
@@ -133,7 +133,7 @@ class Overlay:
         return np.asarray(image)
 
     def _bars(self, axes: np.ndarray) -> np.ndarray:
-        """Return the whole diagram, drawn on its axes."""
+        """Draw the bars and the line of the first loss of stability on `axes`, and return `axes`."""
         take = self._take
         columns = np.arange(self._left, self._right)
         part = (columns - self._left + 0.5) / (self._right - self._left)
@@ -151,21 +151,21 @@ class Overlay:
         return axes
 
     def _column(self, seconds: float) -> int:
-        """Pixel column of a time."""
+        """Return the pixel column of a time [s] in the diagram."""
         part = (seconds - self._begin) / (self._end - self._begin)
         return self._left + round(part * (self._right - self._left - 1))
 
     def _row(self, leg: int) -> int:
-        """Upper pixel row of a leg within the diagram."""
+        """Return the first pixel row of a leg's bars in the diagram."""
         return self._pixels(3 + 10 * leg)
 
     def _pixels(self, size: float) -> int:
-        """Convert a length on a frame of 640 x 480 pixels to pixels of this frame."""
+        """Convert a length on a frame of 640 x 480 pixels to pixels of this film's frames."""
         return max(1, round(size * self._scale))
 
 
 def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:
-    """Return as much of a text as fits into a width [pixels]."""
+    """Return a text, cut and with an ellipsis if it is wider than `width` [pixels]."""
     if font.getlength(text) <= width:
         return text
     while text and font.getlength(f"{text}…") > width:

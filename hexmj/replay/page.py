@@ -1,4 +1,4 @@
-"""One HTML file that plays recordings. It contains everything it needs and loads nothing."""
+"""HTML page that plays recordings: one file, which loads nothing from the network or other files."""
 
 import base64
 import json
@@ -21,15 +21,15 @@ from hexmj.rendering.shapes import body_shapes, ground_shape, joined
 from hexmj.replay.take import Take, takes_of
 
 POSE_INTERVAL = 0.005
-"""Time between two poses [s]."""
+"""Time between two poses of the body in a page [s]."""
 
 MOST_POSES = 4000
-"""Most poses in a page; those of a longer walk are farther apart."""
+"""Maximum number of poses in a page; in a long walk, the time between two poses is longer than `POSE_INTERVAL`."""
 
 PLANNED = {"seconds": "f8", "velocity": "f4", "planned_margin": "f8", "planned_stance": "u1"}
 MEASURED = {"measured_margin": "f8", "measured_stance": "u1"}
 SHAPE = {"corners": "f4", "normals": "f4", "faces": "u4", "colour": "f4", "body": "u1"}
-"""Arrays of a recording, of a physical walk and of a shape in a page, with their types."""
+"""Array in a page -> its type: arrays of every recording, of a physical walk only, and of a `Shape`."""
 
 
 def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STICK_INSECT) -> Path:
@@ -39,8 +39,8 @@ def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STI
     footfall diagram and the stability margin with the recording's own values.
 
     Args:
-        recordings: one or two.
-        path: of the HTML file.
+        recordings: one or two recordings.
+        path: HTML file to write.
         body: description of the recorded body.
 
     Returns:
@@ -55,10 +55,10 @@ def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STI
 
 
 def page_text(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> str:
-    """Return the page of one or two recordings as a text, see `page`."""
+    """Return the HTML text that `page` writes for one or two recordings."""
     takes = takes_of(recordings, body, most=2)
     data = [_page_data(recording, take) for recording, take in zip(recordings, takes, strict=True)]
-    escapes = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}  # neither end the script nor begin a comment
+    escapes = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}  # titles cannot end the script
     recordings_json = json.dumps(data, allow_nan=False).translate(str.maketrans(escapes))
     parts = {"STYLE": _asset("page.css"), "SCRIPT": _asset("page.js"), "RECORDINGS": recordings_json}
     text = _asset("page.html")
@@ -68,7 +68,7 @@ def page_text(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> st
 
 
 def _page_data(recording: xr.Dataset, take: Take) -> dict[str, Any]:
-    """Return a recording as JSON: every step's margins and times as float64, some steps' poses as float32."""
+    """Return a recording for the page's JSON: times and margins of all steps, and poses of the steps `rows`."""
     conditions, body = take.conditions, take.conditions.body
     compiled = compile_body(conditions)
     model = compiled.model
@@ -105,7 +105,7 @@ def _page_data(recording: xr.Dataset, take: Take) -> dict[str, Any]:
 
 
 def _conditions_text(conditions: Conditions, physical: bool) -> str:
-    """Name the body, V_p and the conditions that differ from the defaults."""
+    """Return a line that names the body, V_p and the conditions that differ from the defaults."""
     values, name = conditions.values(), conditions.body.name.replace("_", " ")
     shown = f"{name} in physics" if physical else f"the plan, shown by a {name} that follows it"
     changed = (f"{name.replace('_', ' ')} {values[name]}" for name in unusual(values) if name != "vp")
@@ -113,14 +113,14 @@ def _conditions_text(conditions: Conditions, physical: bool) -> str:
 
 
 def _happened(take: Take) -> str:
-    """State when stability was lost and when the body fell, if the recording lasts until then."""
+    """Return a line with the times of the first loss of stability and the fall that the recording contains."""
     events = (take.lost, "stability first lost"), (take.fell, f"fell on {take.part.replace('_', ' ')}")
     texts = [f"{event} at {1000.0 * seconds:.0f} ms" for seconds, event in events if seconds <= take.end]
     return ", ".join(texts) or f"stability {'never lost' if take.lost == np.inf else 'not lost in this part'}"
 
 
 def _poses(model: mujoco.MjModel, body: Body, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and quaternions of all bodies, (pose, body, 7), and the feet, (pose, leg, 3), in the world [mm]."""
+    """Return positions [mm] and quaternions of MuJoCo's bodies, (pose, body, 7), and feet, (pose, leg, 3) [mm]."""
     data, feet = mujoco.MjData(model), [model.site(foot).id for foot in body.feet]
     poses, tips = np.empty((len(qpos), model.nbody, 7)), np.empty((len(qpos), 6, 3))
     for n, data.qpos[:] in enumerate(qpos):
@@ -130,7 +130,7 @@ def _poses(model: mujoco.MjModel, body: Body, qpos: np.ndarray) -> tuple[np.ndar
 
 
 def _packed(values: Any, kind: str) -> dict[str, Any]:
-    """Return an array as JSON: its type, little-endian, its shape, and its bytes in base64."""
+    """Return an array as JSON: its dtype, shape, and little-endian bytes in base64."""
     array = np.ascontiguousarray(values, dtype=f"<{kind}")
     return {"type": kind, "shape": array.shape, "bytes": base64.b64encode(array.tobytes()).decode()}
 

@@ -1,4 +1,4 @@
-"""Recordings: one start of a walk as a file, with everything that figures, films and pages need."""
+"""Recordings: datasets of the walk from one start, with everything that figures, films and pages need."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -34,7 +34,7 @@ TIMES = {
     "time": (_STEP, "time unit", "time, in the unit 1 mm / V_p"),
     "seconds": (_STEP, "s", "time"),
 }
-"""Coordinates of the steps, with their dimensions, units and meanings."""
+"""Coordinate of the steps -> its dimensions, unit and meaning."""
 
 PLANNED = {
     "velocity": (_STEP, "V_p", "commanded velocity V_r during the step"),
@@ -47,7 +47,7 @@ PLANNED = {
     "qpos": ((*_STEP, "position"), "mm, 1, rad", "root's position and unit quaternion, joint angles"),
     "centre_of_mass": ((*_STEP, "coordinate"), "mm", "centre of mass in the world"),
 }
-"""Variables of every recording."""
+"""Variable of every recording -> its dimensions, unit and meaning."""
 
 MEASURED = {
     "measured_x": (_LEG, "mm", "foot ahead of the centre of mass, from the origin of its axis"),
@@ -66,7 +66,7 @@ MEASURED = {
     "saturation": (_ONCE, "1", "fraction of joints times physics steps at the torque limit"),
     "unreachable": (_ONCE, "1", "tip targets out of reach"),
 }
-"""Variables of a physical walk. A puppet, which only shows the plan, has none of them."""
+"""Further variables of the recording of a physical walk. The recording of a plan has none of them."""
 
 
 @dataclass(frozen=True)
@@ -87,39 +87,39 @@ class Start:
     conditions: Conditions = Conditions()
 
     def walked(self, threads: int | None = None) -> PhysicalWalk:
-        """Return the physical walk."""
+        """Simulate the physical walk and return it."""
         with progress_bar("walking") as progress:
             return self._call(physical_walk, conditions=self.conditions, progress=progress, threads=threads)
 
     def recorded(self, physical: bool, title: str, threads: int | None = None) -> xr.Dataset:
-        """Return a recording of the physical walk, or of the plan."""
+        """Return a recording of the physical walk if `physical`, otherwise of the plan."""
         if physical:
             return record(self.walked(threads), title=title)
         return record_plan(self._call(planned_walk, threads=threads), self.conditions, self.stride, title=title)
 
     def _call(self, walk: Callable[..., Any], **options: Any) -> Any:
-        """Call a measure of walks with the start, controller, velocity, duration, stride and acceleration."""
+        """Call `physical_walk` or `planned_walk` with the fields of this start, except its conditions."""
         time = observation_duration(self.observation_time, self.velocity, self.stride, self.acceleration)
         start, options = draw_start(self.start, self.seed, self.stride), {"stride": self.stride} | options
         return walk(start, self.controller, self.velocity, float(time), acceleration=self.acceleration, **options)
 
     def settings(self, **controllers: Controller) -> dict[str, Any]:
-        """Return what is needed to repeat the walk, as plain data."""
+        """Return the settings with which the walk can be repeated, as plain data."""
         walks = tables.settings(controllers, self.observation_time, 1, self.seed, self.stride, self.acceleration)
         own = {"velocity": self.velocity, "start": self.start}
         return own | walks | {"conditions": self.conditions.settings()}
 
 
 def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
-    """Record what the physical insect did from one start, and the plan; poses and measures are NaN after a fall.
+    """Record the physical walk from one start together with its plan. After a fall, poses and measures are NaN.
 
-    The planned variables are those of the kinematic walk, except `planned_tip`: it is where the tips were commanded to
-    be, which differs with sensory feedback.
+    The planned variables describe the kinematic walk. Only `planned_tip` holds the tips that were commanded in the
+    physical walk; with sensory feedback, these differ from the kinematic tips.
 
     Args:
         walk: physical walks.
-        start: index of the start.
-        title: shown on films.
+        start: index of the recorded start in `walk`.
+        title: title of figures and films.
 
     Returns:
         The variables of `PLANNED` and `MEASURED`, with the title, the conditions and the stride as attributes.
@@ -149,17 +149,17 @@ def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
 def record_plan(
     plan: PlannedWalk, conditions: Conditions, stride: Stride, start: int = 0, title: str = ""
 ) -> xr.Dataset:
-    """Record a puppet that shows the plan of one start: its root moves with V_r, its joints reach the planned tips.
+    """Record the plan of one start, shown by a body that follows it exactly: a puppet, without physics.
 
-    Its trunk stays level at the standing height and its centre of mass is the paper's O. A leg that cannot reach its
-    tip keeps its last angles.
+    The root moves with V_r at the standing height without tilt, and the joints reach the planned tips. The recorded
+    centre of mass is the root, the paper's O. A leg that cannot reach its tip keeps its last angles.
 
     Args:
         plan: planned walks from their first step on.
-        conditions: of the puppet: V_p, and how high and how fast feet are lifted.
-        stride: of the plan.
-        start: index of the start.
-        title: shown on films.
+        conditions: body, V_p, and the height and timing of lifted feet.
+        stride: stride of the plan.
+        start: index of the recorded start in `plan`.
+        title: title of figures and films.
 
     Returns:
         The variables of `PLANNED`, with the title, the conditions and the stride as attributes.
@@ -170,7 +170,7 @@ def record_plan(
     planned = one_start(plan, start)
     steps = len(plan.time)
     if steps == 0 or not np.allclose(plan.time, np.arange(1, steps + 1) * stride.dt, 1e-9, 0.0):
-        raise InputError(f"plan has {steps} steps that do not begin at time 0; expected multiples of {stride.dt}")
+        raise InputError(f"plan: {steps} steps do not begin at time 0; expected all multiples of {stride.dt}")
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)
     root = np.zeros((steps, ROOT_QPOS))
@@ -199,17 +199,17 @@ def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
     """Write a recording as NetCDF.
 
     Raises:
-        InputError: the dataset is no recording, or cannot be written.
+        InputError: the dataset is not a recording, or cannot be written.
     """
     check_recording(recording)
     return write_netcdf(recording, path)
 
 
 def load_recording(path: Path | str) -> xr.Dataset:
-    """Read a recording that `save_recording` wrote, also one of version 0.5.0.
+    """Read a recording that `save_recording` wrote, with this version of hexmj or with 0.5.0.
 
     Raises:
-        InputError: the file cannot be read, or is no recording.
+        InputError: the file cannot be read, or is not a recording.
     """
     recording = read_netcdf(path)
     check_recording(recording, f"{path}: ")
@@ -231,7 +231,7 @@ def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Con
     """Return the conditions of a recorded walk.
 
     Args:
-        recording: of a walk of `body`.
+        recording: recording of a walk.
         body: description of the recorded body.
 
     Raises:
@@ -248,7 +248,7 @@ def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Con
 
 
 def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
-    """Return when a recorded walk lost stability or fell [time units], its least margins [mm] and its outcomes."""
+    """Summarise a recording: times of losses and fall [time units], least margins [mm] and outcomes of the walk."""
     summary: dict[str, Any] = {
         "time units": float(recording.time[-1]),
         "planned loss": float(recording.planned_loss_time),
@@ -268,7 +268,7 @@ def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
 
 
 def _stride_settings(stride: Stride) -> dict[str, Any]:
-    """Return a stride as flat attributes."""
+    """Return the fields of a stride and of its geometry as attributes without nesting."""
     settings = asdict(stride)
     return settings | {name: list(values) for name, values in settings.pop("geometry").items()}
 
@@ -276,7 +276,7 @@ def _stride_settings(stride: Stride) -> dict[str, Any]:
 def _dataset(
     planned: PlannedWalk, conditions: Conditions, stride: Stride, title: str, **values: np.ndarray
 ) -> xr.Dataset:
-    """Build a recording from the plan of one start and further values by the names of their variables."""
+    """Build a recording from the plan of one start; `values` gives the other variables by name."""
     values |= {
         "time": planned.time,
         "seconds": planned.time / conditions.vp,
@@ -301,7 +301,7 @@ def _dataset(
 
 
 def _lifted_tips(planned: PlannedWalk, conditions: Conditions, stride: Stride) -> tuple[np.ndarray, np.ndarray]:
-    """Planned tips of one start in the root frame after each step, (step, leg, 3), and at time 0, (leg, 3) [mm]."""
+    """Return planned tips of one start in the root frame after each step, (step, leg, 3), and at 0, (leg, 3) [mm]."""
     x = planned.x[0] + planned.velocity[0, :, None] * stride.dt  # all legs retract in the first step
     tips = TipTargets(x, conditions, stride).follow(planned, np.array([0]))[0]
     m = conditions.substeps(stride)

@@ -1,4 +1,4 @@
-"""The part of a recording that films and pages show, and its figure: footfall diagram and stability margin."""
+"""`Take`, the part of a recording that films and pages show; the figure with footfall diagram and stability margin."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,37 +24,37 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Take:
-    """The numbers of one recording up to a fall, whose steps have no pose from then on."""
+    """Arrays of one recording for films and pages. They end at a fall, because later steps have no pose."""
 
     title: str
     physical: bool
-    """Whether a physical insect was recorded, or a puppet."""
+    """True for a physical walk, False for a plan."""
     conditions: Conditions
-    """Of the walk."""
+    """Conditions of the walk."""
     step: float
     """Duration of a step [s]."""
     begin: float
-    """Begin of the first step [s]; above 0 in a part of a recording."""
+    """Time at which the first step begins [s]; above 0 if the beginning of the recording was cut off."""
     end: float
     """End of the recording [s], which may be after a fall."""
     velocity: np.ndarray
     """(step,) V_r as a fraction of V_p."""
     margin: np.ndarray
-    """(step,) stability margin [mm]."""
+    """(step,) stability margin [mm], measured in a physical walk, otherwise planned."""
     stance: np.ndarray
-    """(step, leg) which feet stand."""
+    """(step, leg) True where a foot stands."""
     feet: np.ndarray
-    """(step, leg, 2) feet in the world [mm]."""
+    """(step, leg, 2) horizontal positions of the feet in the world [mm]."""
     planned_tip: np.ndarray
     """(step, leg, 3) commanded tips in the world [mm]."""
     centre_of_mass: np.ndarray
-    """(step, 3) in the world [mm]."""
+    """(step, 3) centre of mass in the world [mm]."""
     qpos: np.ndarray
-    """(step, position) of the body."""
+    """(step, position) MuJoCo's positions of the root and the joints."""
     lost: float
-    """First loss of static stability [s], inf for none."""
+    """Time of the first loss of static stability [s]; inf without a loss."""
     fell: float
-    """Fall [s], inf for none."""
+    """Time of the fall [s]; inf without a fall."""
     part: str
     """Part of the trunk that touched the ground first; "" without a fall."""
 
@@ -63,13 +63,13 @@ class Take:
         """Read a recording of a body.
 
         Raises:
-            InputError: the dataset is no recording, is of another body, or holds no pose.
+            InputError: the dataset is not a recording, is of another body, or contains no pose.
         """
         check_recording(recording)
         conditions = recorded_conditions(recording, body)
         poses = int(np.isfinite(recording["qpos"].values).all(axis=1).sum())
         if poses == 0:
-            raise InputError(f"the recording {recording.attrs['title']!r} holds no pose; expected at least one")
+            raise InputError(f"the recording {recording.attrs['title']!r} contains no pose; expected at least one")
         physical = "measured_stance" in recording
         kind = "measured" if physical else "planned"
         shown, vp = recording.isel(step=slice(poses)), conditions.vp
@@ -98,11 +98,11 @@ class Take:
         )
 
     def row(self, seconds: float) -> int:
-        """Index of the step whose end is nearest to a time [s], limited to the steps with a pose."""
+        """Return the index of the step whose end is nearest to a time [s], among the steps with a pose."""
         return int(np.clip(round((seconds - self.begin) / self.step) - 1, 0, len(self.qpos) - 1))
 
     def support(self, row: int) -> tuple[np.ndarray, float]:
-        """Support polygon at the end of a step and the level at which it is drawn, see `support_on_ground`."""
+        """Return the support polygon at the end of a step, and the height at which it is drawn [mm]."""
         return support_on_ground(self.conditions, self.feet[row], self.stance[row], self.centre_of_mass[row])
 
 
@@ -110,7 +110,7 @@ def takes_of(recordings: Sequence[xr.Dataset], body: Body, most: int) -> list[Ta
     """Read one to `most` recordings of a body.
 
     Raises:
-        InputError: too many recordings or none, or one that cannot be shown.
+        InputError: there are too many recordings or none, or `Take.of` cannot read a recording.
     """
     if not 1 <= len(recordings) <= most:
         raise InputError(f"{len(recordings)} recordings; expected 1 to {most}")
@@ -118,19 +118,19 @@ def takes_of(recordings: Sequence[xr.Dataset], body: Body, most: int) -> list[Ta
 
 
 def margin_in_words(margin: float) -> str:
-    """Return a stability margin [mm] as a text; it is infinite if no foot stands."""
+    """Return a stability margin [mm] as a text; an infinite margin means that no foot stands."""
     return f"margin {margin:+.1f} mm" if np.isfinite(margin) else "no foot stands"
 
 
 def support_on_ground(
     conditions: Conditions, feet: np.ndarray, stance: np.ndarray, centre: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Return the support polygon, (corner, 2), and the height of the highest ground below it, where it is drawn [mm].
+    """Return the support polygon, (corner, 2), and the height at which it is drawn, its highest ground [mm].
 
     Args:
-        conditions: with the ground.
-        feet: in the world, (leg, 2) [mm].
-        stance: which of them stand, (leg,).
+        conditions: conditions of the walk, which define the ground.
+        feet: horizontal positions in the world, (leg, 2) [mm].
+        stance: True for feet that stand, (leg,).
         centre: centre of mass in the world, (3,) [mm].
     """
     corners = support_polygon(feet, stance)
@@ -141,10 +141,10 @@ def support_on_ground(
 def walk_figure(recording: xr.Dataset) -> "Figure":
     """Draw the footfall diagram and the stability margin of a recording over time.
 
-    The bars are those of its film: a foot off the ground, or a protraction of a puppet.
+    A bar is a foot off the ground; in the recording of a plan, it is a protraction.
 
     Args:
-        recording: whole or some consecutive steps of it.
+        recording: a recording, or consecutive steps of it.
     """
     figure = picture(8.0, 4.8)
     footfall, margin = figure.subplots(2, 1, sharex=True, height_ratios=(1.2, 1.0))

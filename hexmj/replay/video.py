@@ -24,10 +24,10 @@ from hexmj.replay.take import Take, takes_of
 from hexmj.validate import choice
 
 BRIGHTER = 1.2
-"""Factor of the ground's colour in films without shadows, which MuJoCo lights less."""
+"""Factor on the ground's colour in films without shadows, because MuJoCo renders these darker."""
 
 IN_A_ROW = 3
-"""Most recordings in one row."""
+"""Maximum number of recordings in one row of a film."""
 
 GROUND = "ground"
 """Name of the ground's texture, if the MJCF has one."""
@@ -44,14 +44,14 @@ def render(
     """Film one recording, or up to six side by side with one clock. A body that fell stays in its last pose.
 
     Args:
-        recordings: one to six; four or more stand in two rows.
-        path: of the film, with the suffix .mp4 or .gif.
+        recordings: one to six recordings; four or more are shown in two rows.
+        path: file of the film, with the suffix .mp4 or .gif.
         film: camera, size, speed and quality.
         progress: True for a bar, or a function that receives the fraction done since its last call.
         body: description of the recorded body.
 
     Returns:
-        Number of frames: the time from the first beginning to the last end, at `Film.fps`.
+        Number of frames. The film lasts from the earliest beginning to the latest end of the recordings.
 
     Raises:
         InputError: no recording or too many, another suffix, a recording without a pose or of another body.
@@ -75,7 +75,7 @@ def render(
 
 
 def missing() -> str | None:
-    """Return why no film can be made on this machine and what to install, or None."""
+    """Return why this machine cannot make films and what to install; None if it can."""
     encoder = find_spec("imageio_ffmpeg") and find_spec("mediapy")
     return gl.missing() or (None if encoder else str(without_extra("film", "mediapy or imageio-ffmpeg")))
 
@@ -83,7 +83,7 @@ def missing() -> str | None:
 def _frames(
     takes: Sequence[Take], overlays: Sequence[Overlay], times: np.ndarray, film: Film, progress: Progress | None
 ) -> Iterator[np.ndarray]:
-    """Yield frames of takes side by side at times on their clock, (frame,) [s]; a second thread draws the overlays."""
+    """Yield frames with the takes side by side at `times` of the walk, (frame,) [s]; a second thread draws overlays."""
     rows = 1 if len(takes) <= IN_A_ROW else 2
     columns = -(-len(takes) // rows)
     picture = np.full((film.height * rows, film.width * columns, 3), 255, dtype=np.uint8)
@@ -114,7 +114,7 @@ def _frames(
 
 
 def _filmed_body(film: Film, conditions: Conditions) -> mujoco.MjModel:
-    """Return a body on its ground, with the size and quality of a film."""
+    """Return the model of a body on its ground, set up for the size and quality of a film."""
     model = compile_body(conditions).model
     model.vis.global_.offwidth, model.vis.global_.offheight = film.width, film.height
     if film.quality == "high":
@@ -131,7 +131,7 @@ def _filmed_body(film: Film, conditions: Conditions) -> mujoco.MjModel:
 
 
 def _view(stage: tuple[gl.Renderer, mujoco.MjData], camera: str, take: Take, row: int) -> tuple[np.ndarray, float]:
-    """Render the end of step `row`, (height, width, 3), and return its pixels per mm at the centre of mass."""
+    """Return the picture of the end of step `row`, (height, width, 3), and its pixels per mm at the centre of mass."""
     renderer, data = stage
     data.qpos[:] = take.qpos[row]
     mujoco.mj_kinematics(renderer.model, data)
@@ -147,7 +147,7 @@ def _view(stage: tuple[gl.Renderer, mujoco.MjData], camera: str, take: Take, row
 
 
 def _pixels_per_mm(renderer: mujoco.Renderer, point: np.ndarray) -> float:
-    """Scale across the view at a point, (3,) [mm]; 0 if the point is not ahead of the camera."""
+    """Return the pixels per mm at a point of the scene, (3,) [mm]; 0 if the point is behind the camera."""
     camera = renderer.scene.camera[0]
     ahead = float(np.dot(point - camera.pos, camera.forward))
     if ahead <= camera.frustum_near:

@@ -1,4 +1,4 @@
-"""A live walk in a browser, by viser: the insect, sliders, margin and footfall; and a server of one page."""
+"""View of a live walk in a browser with viser (insect, controls, margin, footfall), and a server of one HTML page."""
 
 import io
 import logging
@@ -27,10 +27,10 @@ from hexmj.view.session import IMPULSE, LiveSession, ticks
 from hexmj.walks import footfall_html
 
 CHART_INTERVAL = 6
-"""Frames between two drawings of the charts."""
+"""Number of frames from one update of the charts to the next."""
 
 CHARTED = 2.0
-"""Time that the charts show [s]."""
+"""Length of the time that the charts show [s]."""
 
 RANGES = {
     "p1_i": (0.0, 20.0), "p1_c": (0.0, 20.0), "p31_i": (-20.0, 20.0), "p32_i": (0.0, 20.0), "p33_i": (0.0, 2.0),
@@ -39,13 +39,13 @@ RANGES = {
 """Ranges of the sliders of symmetric weights, wide enough for both published weight sets."""
 
 SWITCHES = ("p2", "p4_i")
-"""Weights that are on or off and have check boxes."""
+"""Weights that are on (1) or off (0), and have check boxes instead of sliders."""
 
 MEASURED, PLANNED = "#c8740a", "#1b6ca8"
 
 
 def check_port(host: str, port: int) -> None:
-    """Raise InputError if a server cannot listen at an address; port 0 stands for any free port."""
+    """Raise InputError if no server can listen at the host and port; port 0 means any free port."""
     whole("port", port, 0, 65535)
     try:
         socket.create_server((host, port)).close()
@@ -55,7 +55,7 @@ def check_port(host: str, port: int) -> None:
 
 
 def page_server(text: str, host: str, port: int) -> ThreadingHTTPServer:
-    """Return a server of one HTML page; its `serve_forever` serves it.
+    """Return a server of one HTML page; call its `serve_forever` to serve the page.
 
     Raises:
         InputError: the address is not free.
@@ -81,13 +81,13 @@ class BrowserView:
     """A viser server that shows a live walk.
 
     Attributes:
-        address: of the page.
-        controls: viser's handles of the sliders and boxes that change the walk, by name.
-        server: of viser.
+        address: URL of the page.
+        controls: name -> viser's handle of a slider or check box that changes the walk.
+        server: viser's server.
     """
 
     def __init__(self, session: LiveSession, host: str = "127.0.0.1", port: int = 8080) -> None:
-        """Serve; port 0 takes any free port.
+        """Start the server; port 0 chooses any free port.
 
         Raises:
             InputError: viser is missing, or the address is not free.
@@ -111,7 +111,7 @@ class BrowserView:
         self._make_charts()
 
     def run(self) -> None:
-        """Walk and show until the process is interrupted."""
+        """Advance and show the walk in real time until the process is interrupted."""
         try:
             for n, passed in enumerate(ticks()):
                 self.step(passed, n % CHART_INTERVAL == 0)
@@ -120,7 +120,7 @@ class BrowserView:
                 self.server.stop()
 
     def step(self, passed: float, charts: bool = True) -> None:
-        """Apply the changes of the controls, advance by a time [s], and show the walk."""
+        """Apply changes from the controls, advance the walk by `passed` [s], and show it (charts only if `charts`)."""
         while not self._changes.empty():
             self.session.attempt(self._changes.get())
         moment = self.session.tick(passed)
@@ -128,14 +128,14 @@ class BrowserView:
             self._make_scene()
         self._recent.extend(self.session.walk.trace)
         while self._recent and not moment.seconds - CHARTED <= self._recent[0].seconds <= moment.seconds:
-            self._recent.popleft()  # too old, or of a walk before this one
+            self._recent.popleft()  # too old, or from before a restart of the walk
         with self.server.atomic():
             self._show(moment)
             if charts:
                 self._show_charts(moment)
 
     def _change(self, change: Callable[[LiveWalk], object]) -> None:
-        """Queue a change of the walk; viser calls from threads of its own."""
+        """Queue a change of the walk until the next `step`, because viser calls this method from its own threads."""
         self._changes.put(lambda: change(self.session.walk))
 
     def _make_controls(self) -> None:
@@ -143,18 +143,18 @@ class BrowserView:
         self._readout = gui.add_markdown("")
         with gui.add_folder("Walk"):
             v, now = walk.velocity, walk.conditions.vp
-            velocity = gui.add_slider("V", 0.0, max(0.95, v), 0.01, v, hint="from the next step on")
+            velocity = gui.add_slider("V", 0.0, max(0.95, v), 0.01, v, hint="changes with the next step")
             velocity.on_update(lambda _: self._change(lambda walk: walk.steer(velocity=velocity.value)))
-            vp = gui.add_slider("V_p [mm/s]", min(20, now), max(400, now), 5, now, hint="the walk begins again")
+            vp = gui.add_slider("V_p [mm/s]", min(20, now), max(400, now), 5, now, hint="restarts the walk")
             vp.on_update(
                 lambda _: self._change(lambda walk: walk.begin(conditions=replace(walk.conditions, vp=float(vp.value))))
             )
             self.controls |= {"V": velocity, "V_p": vp}
             paused = gui.add_checkbox("pause", False)
             paused.on_update(lambda _: setattr(self.session, "paused", paused.value))
-            begins = {"same start": self.session.begin, "next start": self.session.begin_next}
-            buttons = gui.add_button_group("", tuple(begins))
-            buttons.on_click(lambda _: self._change(lambda _: begins[buttons.value]()))
+            restarts = {"same start": self.session.begin, "next start": self.session.begin_next}
+            buttons = gui.add_button_group("", tuple(restarts))
+            buttons.on_click(lambda _: self._change(lambda _: restarts[buttons.value]()))
         with gui.add_folder("Push"):
             impulse = gui.add_slider("to the left [m V_p]", -60.0, 60.0, 1.0, IMPULSE)
             gui.add_button("Push").on_click(lambda _: self._change(lambda walk: walk.push(float(impulse.value))))
@@ -181,7 +181,7 @@ class BrowserView:
             handle.on_update(changed)
 
     def _make_scene(self) -> None:
-        """Add body and ground under the current conditions; the ground moves below a fixed centre of mass."""
+        """Add body, ground and marks. The centre of mass keeps its horizontal place, and the ground moves below it."""
         scene, conditions = self.server.scene, self.session.walk.conditions
         self._shown_conditions, compiled = conditions, compile_body(conditions)
         self._model, self._data = compiled.model, mujoco.MjData(compiled.model)
@@ -218,7 +218,7 @@ class BrowserView:
         self._labels = [scene.add_label(f"/label_{leg}", leg) for leg in LEGS]
 
     def _show(self, moment: Moment) -> None:
-        """Move everything to its place, seen from the ground below the centre of mass."""
+        """Place body, ground and marks; the origin is the point at height 0 below the centre of mass."""
         centre = moment.centre_of_mass
         origin = np.array([*centre[:2], 0.0])
         self._data.qpos[:] = moment.qpos

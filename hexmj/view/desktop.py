@@ -1,4 +1,4 @@
-"""A walk or a recording in MuJoCo's own viewer, whose camera follows the insect."""
+"""View of a live walk or a recording in MuJoCo's own viewer, whose camera follows the insect."""
 
 import os
 import sys
@@ -22,14 +22,14 @@ from hexmj.view.session import IMPULSE, LYING_TIME, LiveSession, ticks
 
 PAUSE = "space pauses"
 KEYS = f"{PAUSE}, up and down change V, left and right push, enter takes the next start"
-"""Keys of a recording and of a live walk."""
+"""Help on the keys of a recording (PAUSE) and of a live walk (KEYS)."""
 
 SPACE, ENTER, RIGHT, LEFT, DOWN, UP = 32, 257, 262, 263, 264, 265
-"""Codes of the keys in GLFW."""
+"""GLFW's codes of the keys."""
 
 
 def screen() -> bool:
-    """Whether there is a screen for a window."""
+    """Return whether there is a screen on which a window can open."""
     return sys.platform != "linux" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
 
 
@@ -45,7 +45,7 @@ def view_live(session: LiveSession) -> None:
 
 
 def view_recording(take: Take) -> None:
-    """Show a recording again and again at half speed until the window is closed."""
+    """Play a recording in an endless loop at half speed until the window is closed."""
     seconds, paused = 0.0, False
 
     def pause(key: int) -> None:
@@ -62,7 +62,7 @@ def view_recording(take: Take) -> None:
 
 
 def _opened(conditions: Conditions, press: Callable[[int], object]) -> Iterator[tuple[Any, float]]:
-    """Yield a window and the time since the last frame [s] until it is closed; `press` receives the pressed keys."""
+    """Open a window, and yield it with the time since the last frame [s] until it is closed; pass keys to `press`."""
     keys = SimpleQueue[int]()
     with _window(conditions, keys.put) as window:
         for passed in takewhile(lambda _: window.is_running(), ticks()):
@@ -72,14 +72,14 @@ def _opened(conditions: Conditions, press: Callable[[int], object]) -> Iterator[
 
 
 def _press(session: LiveSession, key: int) -> None:
-    """Do what a key means."""
-    walk, faster = session.walk, {UP: 0.05, DOWN: -0.05}.get(key)
+    """Change the live walk as the pressed key asks for, see `KEYS`."""
+    walk, change = session.walk, {UP: 0.05, DOWN: -0.05}.get(key)
     if key == SPACE:
         session.paused = not session.paused
     elif key == ENTER:
         session.begin_next()
-    elif faster:
-        walk.steer(velocity=float(np.clip(walk.velocity + faster, 0.0, 0.95)))
+    elif change:
+        walk.steer(velocity=float(np.clip(walk.velocity + change, 0.0, 0.95)))
     elif key in (LEFT, RIGHT):
         walk.push(IMPULSE if key == LEFT else -IMPULSE)
 
@@ -96,13 +96,13 @@ def _window(conditions: Conditions, on_key: Callable[[int], None]) -> Any:
     compiled = compile_body(conditions)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # GLFW only warns, and MuJoCo would then end the process
+            warnings.simplefilter("ignore")  # without a display GLFW warns, and MuJoCo would exit
             if not glfw.init():
                 raise RuntimeError("no display")
         window = mujoco.viewer.launch_passive(
             compiled.model, mujoco.MjData(compiled.model), key_callback=on_key, show_left_ui=False, show_right_ui=False
         )
-    except RuntimeError as error:  # also on macOS, where only mjpython can open it
+    except RuntimeError as error:  # macOS needs mjpython to open a window
         raise RenderingError(f"No window can be opened: {error}. Use --browser.") from None
     window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, compiled.root
     window.cam.distance, window.cam.azimuth = 5 * conditions.body.lengths.shortest_leg, 60.0
@@ -113,7 +113,7 @@ def _window(conditions: Conditions, on_key: Callable[[int], None]) -> Any:
 def _show(
     window: Any, conditions: Conditions, qpos: np.ndarray, margin: float, seen: tuple, text: str, message: str = ""
 ) -> None:
-    """Show a pose with the marks of a film, and texts in two corners."""
+    """Show a pose, its support polygon, centre of mass and planned tips, and texts in two corners."""
     (feet, stance, centre, tips), marks, scene = seen, conditions.body.marks, window.user_scn
     stable = bool(margin > 0.0)
     with window.lock():

@@ -1,4 +1,4 @@
-"""One insect that walks on and on, whose controller, velocity and conditions may change on the way."""
+"""Live walk of one insect, whose controller, velocity and conditions can change while it walks."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,32 +24,32 @@ from hexmj.validate import leg_last, number, numbers
 from hexmj.walks import PlannedWalk, joined, part_of
 
 ONLY = np.array([0])
-"""The index of the only insect."""
+"""Array with the index of the only insect of a live walk."""
 
 STRONGEST_PUSH = 80.0
-"""Strongest push, as of `hexmj disturb` [body mass times V_p]."""
+"""Maximum impulse of a push, the same as in `hexmj disturb` [body mass times V_p]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """State of an insect at the end of a step."""
+    """State of the insect and its plan at the end of a step."""
 
     seconds: float
     """Time since the walk began [s]."""
     velocity: float
     """Commanded V_r, a fraction of V_p."""
     qpos: np.ndarray
-    """(position,) as MuJoCo has them."""
+    """(position,) MuJoCo's positions of the root and the joints."""
     feet: np.ndarray
-    """(leg, 3) in the world [mm]."""
+    """(leg, 3) feet in the world [mm]."""
     planned_tips: np.ndarray
     """(leg, 3) commanded tips in the world [mm]."""
     centre_of_mass: np.ndarray
-    """(3,) in the world [mm]."""
+    """(3,) centre of mass in the world [mm]."""
     stance: np.ndarray
-    """(leg,) which feet stand."""
+    """(leg,) True where a foot stands."""
     planned_stance: np.ndarray
-    """(leg,) which legs retract in the plan."""
+    """(leg,) True where a leg retracts in the plan."""
     margin: float
     """Measured stability margin [mm]."""
     planned_margin: float
@@ -57,25 +57,25 @@ class Moment:
 
 
 class SteeredPlan:
-    """A plan of one start that another controller can take over; steps count from the first controller's begin."""
+    """Plan of one start that another controller can take over; its time goes on when the controller changes."""
 
     def __init__(self, controller: Controller, starts: np.ndarray, velocity: float, stride: Stride) -> None:
-        """Begin at `starts`, (1, leg) [mm]."""
+        """Begin the plan at `starts`, the tips of one start, (1, leg) [mm]."""
         self.starts, self.stride, self.done = starts, stride, 0
         self.current: Plan = begin(controller, starts, velocity, stride, threads=1)
         self.made_for = getattr(self.current, "made_for", None)
 
     def advance(self, steps: int) -> PlannedWalk:
-        """Return the next steps."""
-        walk = self.current.advance(steps)  # the physics checks it
+        """Return the next `steps` steps of the plan."""
+        walk = self.current.advance(steps)  # `OrdersFromPlan` checks it
         self.done += steps
         return replace(walk, time=np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt)
 
     def hand_over(self, controller: Controller, velocity: float) -> bool:
-        """Let a controller continue at V_r from the current tips and stance; it knows nothing else of the last plan.
+        """Let a controller continue at `velocity` (V_r) from the current tips and stance.
 
         Returns:
-            Whether both the last plan and the controller can be steered; otherwise nothing has changed.
+            True if the controller continues; False, without a change, if it or the current plan cannot be steered.
         """
         if not (isinstance(controller, SteerableController) and isinstance(self.current, SteerablePlan)):
             return False
@@ -86,12 +86,12 @@ class SteeredPlan:
 
 
 class LiveWalk:
-    """A walk of one insect, advanced in steps."""
+    """A physical walk of one insect that is advanced step by step."""
 
     moment: Moment
-    """The current state."""
+    """Current state of the insect and its plan."""
     trace: list[Moment]
-    """Steps of the last call of `advance`; the last one is `moment`."""
+    """States after each step of the last call of `advance`; the last element is `moment`."""
     fell_on: str
     """Part of the trunk that has touched the ground; "" while the insect walks."""
 
@@ -103,17 +103,17 @@ class LiveWalk:
         conditions: Conditions = Conditions(),
         stride: Stride = Stride(),
     ) -> None:
-        """Settle at a start.
+        """Let the insect settle at a start and walk its first step.
 
         Args:
-            controller: plans the walk.
+            controller: controller that plans the walk.
             velocity: V_r as a fraction of V_p.
-            start: tips on their own axes, all standing, (leg,) [mm].
-            conditions: of the walk.
-            stride: of the plan.
+            start: tips on their own axes at time 0, (leg,) [mm]; all feet stand.
+            conditions: conditions of the walk.
+            stride: stride of the plan.
 
         Raises:
-            InputError: the insect cannot walk with these values.
+            InputError: the insect cannot walk with these arguments.
         """
         self.controller, self.velocity = controller, number("velocity", velocity)
         self.start = numbers("start", leg_last(start))
@@ -121,10 +121,10 @@ class LiveWalk:
         self.begin()
 
     def begin(self, start: np.ndarray | None = None, conditions: Conditions | None = None) -> None:
-        """Begin again, at another start or under other conditions if these are given.
+        """Restart the walk, with another start or other conditions if these are given.
 
         Raises:
-            InputError: the insect cannot walk with these values; the last walk continues.
+            InputError: the insect cannot walk with these arguments; the walk before the call continues.
         """
         start = self.start if start is None else numbers("start", leg_last(start))
         conditions = conditions or self.conditions
@@ -139,18 +139,18 @@ class LiveWalk:
             self.start, self.conditions, self.settled = start, conditions, settled
             self.trace, self.fell_on, self._time_left = [], "", 0.0
             self._last_step: PlannedWalk | None = None
-            self._walk(2)  # the second step shows the end of the first
+            self._walk(2)  # the end of a step is known when the next begins
 
     def steer(self, *, velocity: float | None = None, controller: Controller | None = None) -> bool:
         """Change V_r, the controller, or both, from the next step on.
 
-        If a controller cannot continue from the current legs, the walk begins again at its start.
+        If the controller cannot continue from the current tips and stance, the walk restarts at its start.
 
         Returns:
-            Whether the walk continued.
+            True if the walk continues, False if it restarts.
 
         Raises:
-            InputError: a bad velocity or controller; the last walk continues.
+            InputError: a bad velocity or controller; the walk before the call continues.
         """
         velocity = self.velocity if velocity is None else number("velocity", velocity)
         controller = self.controller if controller is None else controller
@@ -163,7 +163,7 @@ class LiveWalk:
 
     @contextmanager
     def _restored_if_it_fails(self) -> Iterator[None]:
-        """Continue the last walk after an error."""
+        """Restore the attributes of this walk if the block raises an error."""
         before = vars(self).copy()
         try:
             yield
@@ -172,10 +172,10 @@ class LiveWalk:
             raise
 
     def push(self, impulse: float) -> None:
-        """Push from the side at the root, within the next `pushes.PUSH_LASTS` or two. It replaces an earlier push.
+        """Push the root from the side. The push starts within two push durations and replaces an earlier push.
 
         Args:
-            impulse: to the left, as of `hexmj disturb` [body mass times V_p].
+            impulse: impulse to the left; negative to the right [body mass times V_p].
 
         Raises:
             InputError: the impulse is out of range, or the steps of the plan cannot hold a push.
@@ -186,13 +186,13 @@ class LiveWalk:
         self._push.time[:] = (self._plan.done // self._push_steps + 1) * self._push_steps * self.stride.dt
 
     def advance(self, seconds: float) -> Moment:
-        """Walk for a time, in whole steps of the plan; later calls make up for the remainder.
+        """Walk for `seconds`, in whole steps of the plan; the next call adds the remaining time.
 
         Returns:
-            The current state; that before the fall if the insect has fallen.
+            The current state; after a fall, the last state before it.
 
         Raises:
-            InputError: a bad time, more than `MOST_STEPS` in all, the end of the ground, or a failing controller.
+            InputError: a bad time, more than `MOST_STEPS` steps in all, the end of the ground, a failing controller.
             SimulationError: the simulation diverged.
         """
         self._time_left += number("seconds", seconds, 0.0, 60.0)
@@ -204,7 +204,7 @@ class LiveWalk:
             until_push = self._push_steps - self._plan.done % self._push_steps
             now = min(steps, steps_in_chunk(self.settled.substeps), until_push)
             if self._plan.done + now >= MOST_STEPS:
-                raise InputError(f"the walk has {MOST_STEPS:g} steps, the most possible; begin it again")
+                raise InputError(f"the walk has reached its maximum of {MOST_STEPS:g} steps; restart it")
             self._walk(now)
             steps -= now
         return self.moment
@@ -219,7 +219,8 @@ class LiveWalk:
             self.moment = self.trace[-1]
 
     def _moments(self, chunk: Chunk) -> Iterator[Moment]:
-        """States of a chunk: the insect and its plan as each step but the first begins, until the insect falls."""
+        """Yield the states of insect and plan at the ends of steps, until a fall; a chunk shows the end of the step
+        before it, and not the end of its own last step."""
         columns, walk, centre = measured_walk(chunk, self.settled)
         margins = walk_margin(walk, threads=1)[:, 0]
         plan = joined([self._last_step or part_of(chunk.plan, slice(1)), chunk.plan])

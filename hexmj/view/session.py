@@ -1,4 +1,4 @@
-"""A live walk in real time, for every viewer."""
+"""Live walk in real time, for the browser and MuJoCo's viewer."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -11,10 +11,10 @@ FRAME_RATE = 30.0
 """Frames per second."""
 
 LONGEST_STEP = 0.1
-"""Most simulated time per frame [s]; a slower computer falls behind real time."""
+"""Maximum simulated time per frame [s]; on a slow computer, the walk runs slower than real time."""
 
 IMPULSE = 8.0
-"""Default impulse of a push [body mass times V_p]; it moves the insect 20 mm aside."""
+"""Default impulse of a push [body mass times V_p]; it moves the insect 20 mm to the side."""
 
 LYING_TIME = 1.5
 """Time between a fall and the next start [s]."""
@@ -37,50 +37,50 @@ class LiveSession:
         walk: the live walk.
         start: number of its start.
         paused: whether the walk stands still; viewers set it.
-        message: why the last change was refused, or "".
+        message: error message of the last change, or "".
     """
 
     def __init__(self, walk: LiveWalk, start: int, starts: Callable[[int], np.ndarray]) -> None:
-        """Show a walk from start number `start`; `starts` returns a start, (leg,) [mm], by its number."""
+        """Show `walk`, which has the number `start`; `starts` returns a start, (leg,) [mm], by its number."""
         self.walk, self.start, self.paused, self.message = walk, start, False, ""
         self._starts, self._tried, self._lying = starts, start, 0.0
 
     def tick(self, passed: float) -> Moment:
-        """Advance by a time [s]."""
+        """Advance the walk by `passed` [s] unless it is paused, and return its state."""
         self.walk.trace = []
         if self.paused:
             return self.walk.moment
         if not self.walk.fell_on:
-            if not self._done(lambda: self.walk.advance(min(passed, LONGEST_STEP))):
-                self._done(self.begin)
+            if not self._succeeds(lambda: self.walk.advance(min(passed, LONGEST_STEP))):
+                self._succeeds(self.begin)
         elif (lying := self._lying + passed) < LYING_TIME:
             self._lying = lying
         else:
-            self._done(self.begin_next)
+            self._succeeds(self.begin_next)
         return self.walk.moment
 
     def begin(self) -> None:
-        """Begin again at the same start."""
+        """Restart the walk at the same start."""
         self._begin(self.start)
 
     def begin_next(self) -> None:
-        """Begin at the next start; another call skips a start that cannot be walked."""
+        """Restart the walk at the next start; if that fails, the next call tries the start after it."""
         self._begin(self._tried + 1)
 
     def attempt(self, change: Callable[[], object]) -> None:
-        """Change the walk; if that is refused, set `message`."""
+        """Change the walk; if the change raises an error, `message` holds its text."""
         self.message = ""
-        self._done(change)
+        self._succeeds(change)
 
     def _begin(self, start: int) -> None:
         self._tried, self._lying = start, 0.0
         self.walk.begin(self._starts(start))
         self.start = start
 
-    def _done(self, change: Callable[[], object]) -> bool:
+    def _succeeds(self, change: Callable[[], object]) -> bool:
         try:
             change()
-        except Exception as error:  # also any error of a controller
+        except Exception as error:  # a controller can raise any error
             self.message = str(error)
             return False
         return True
