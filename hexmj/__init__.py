@@ -1,7 +1,7 @@
-"""hexmj: controllers of six-legged walking drive a stick insect in MuJoCo, and its stability is measured twice.
+"""hexmj: controllers of six-legged walking drive a stick insect; its stability is measured with and without physics.
 
-Units are mm, g, s and radians; velocities V are fractions of the protraction velocity V_p, and one time
-unit of a plan is 1 mm / V_p.  Names are imported when they are first used.
+Units are mm, g, s and radians. A velocity V is a fraction of the protraction velocity V_p. One time unit of a plan is
+1 mm / V_p. A name such as `hexmj.flss` is imported when it is first used.
 """
 
 import lazy_loader

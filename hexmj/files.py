@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SEARCHED = "searched"
-"""Key under which a TOML file of `hexmj search` names the starts on which it searched."""
+"""Key of the table in a TOML file of `hexmj search` that holds the seeds of the starts used in the search."""
 
 
 @contextmanager
 def replacing(path: Path | str) -> Iterator[Path]:
-    """Provide a temporary path beside `path`; at the end of the block the file there replaces `path`."""
+    """Provide a temporary path in the folder of `path`. If the block raises no error, its file replaces `path`."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".part-{uuid4().hex}{path.suffix}")
@@ -31,17 +31,17 @@ def replacing(path: Path | str) -> Iterator[Path]:
 
 
 def write_text(path: Path | str, text: str) -> Path:
-    """Write a text in UTF-8."""
+    """Write a text file in UTF-8, and return its path."""
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
     return Path(path)
 
 
 def write_netcdf(data: "xr.Dataset", path: Path | str) -> Path:
-    """Write a dataset as NetCDF 4; the bits of all numbers stay.
+    """Write a dataset as NetCDF 4 without changing a bit of its numbers, and return the path.
 
     Raises:
-        InputError: an attribute or variable that NetCDF cannot hold.
+        InputError: NetCDF cannot store an attribute or variable.
     """
     import h5netcdf
     from xarray.backends import H5NetCDFStore
@@ -55,7 +55,7 @@ def write_netcdf(data: "xr.Dataset", path: Path | str) -> Path:
             with h5netcdf.File(part, "w") as file:  # `to_netcdf` would ask a Dask cluster for a lock
                 plain.dump_to_store(H5NetCDFStore(file, lock=no_lock))
         except (TypeError, ValueError) as error:
-            raise InputError(f"{path}: NetCDF cannot hold this dataset: {error}") from None
+            raise InputError(f"{path}: NetCDF cannot store this dataset: {error}") from None
     return Path(path)
 
 
@@ -63,7 +63,7 @@ def read_netcdf(path: Path | str) -> "xr.Dataset":
     """Read a dataset that `write_netcdf` wrote.
 
     Raises:
-        InputError: the file cannot be read, or is no NetCDF.
+        InputError: the file cannot be read, or is not NetCDF.
     """
     import xarray as xr
 
@@ -76,10 +76,10 @@ def read_netcdf(path: Path | str) -> "xr.Dataset":
 
 
 def read_toml(path: Path | str) -> dict[str, Any]:
-    """Read the table of a TOML file.
+    """Read a TOML file as a dict.
 
     Raises:
-        InputError: the file cannot be read, or is no TOML.
+        InputError: the file cannot be read, or is not TOML.
     """
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))

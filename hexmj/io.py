@@ -18,20 +18,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TEXTS = ("study", "model", "over", "reference", "title", "body", "ground")
-"""Attributes that are never JSON, whatever their text looks like."""
+"""Attributes that `settings` returns as text, even if the text looks like JSON."""
 
 MANIFEST = "manifest.json"
-"""Name of the file that says how results were made, or the end of its name."""
+"""Name of the file that records how results were made; some commands put a prefix before it."""
 
 LIBRARIES = ("mujoco", "numpy", "scipy", "numba", "xarray", "matplotlib")
-"""Packages whose versions a manifest records, beside hexmj and Python."""
+"""Packages whose versions a manifest records, in addition to hexmj and Python."""
 
 
 def load(path: Path | str) -> "xr.Dataset":
     """Read a result that a command or `save` wrote.
 
     Args:
-        path: such as "results/compare/comparison.nc".
+        path: NetCDF file, such as "results/compare/comparison.nc".
 
     Raises:
         InputError: the file cannot be read.
@@ -43,17 +43,17 @@ def save(result: "xr.Dataset", path: Path | str) -> Path:
     """Write a result as NetCDF, for `load` or any other reader.
 
     Args:
-        result: of `compare`, `flss`, a study or `record`. Settings that NetCDF has no type for become JSON text.
-        path: of the file, which is replaced if it exists.
+        result: result of `compare`, `flss`, a study or `record`. Settings without a NetCDF type become JSON text.
+        path: NetCDF file to write; an existing file is replaced.
 
     Raises:
-        InputError: the result holds something that NetCDF cannot.
+        InputError: the result contains a value that NetCDF cannot store.
     """
     return write_netcdf(result.assign_attrs(attributes(result.attrs)), path)
 
 
 def attributes(settings: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return settings as attributes that NetCDF can hold: texts, numbers and arrays, everything else as JSON text."""
+    """Return settings as attributes for NetCDF: texts, numbers and arrays stay, other values become JSON text."""
 
     def plain(value: Any) -> Any:
         value = value.item() if isinstance(value, np.generic) else value
@@ -65,13 +65,13 @@ def attributes(settings: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def settings(result: "xr.Dataset") -> dict[str, Any]:
-    """Return what a result was made with: controllers, observation time, starts, seed, conditions.
+    """Return the settings of a result: controllers, observation time, starts, seed, conditions.
 
     Args:
-        result: of `compare`, `flss` or a study, fresh or read from a file.
+        result: result of `compare`, `flss` or a study, computed now or read from a file.
 
     Returns:
-        Numbers, texts, lists and dicts by name, such as `settings(result)["conditions"]["vp"]`.
+        Name -> number, text, list or dict; for example, `settings(result)["conditions"]["vp"]` is V_p.
     """
     return {str(name): value if name in TEXTS else _parsed(value) for name, value in result.attrs.items()}
 
@@ -89,7 +89,7 @@ def results_folder(path: Path | str) -> Path:
     """Make a directory for results and return its path.
 
     Raises:
-        InputError: it cannot be made.
+        InputError: the directory cannot be made.
     """
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
@@ -99,7 +99,7 @@ def results_folder(path: Path | str) -> Path:
 
 
 def save_figure(figure: "Figure", path: Path) -> Path:
-    """Write a figure in the format of the path's suffix, without a date."""
+    """Write a figure in the format of the path's suffix, without a date, so that equal figures are equal files."""
     undated: dict[str, Any] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     with replacing(path) as part:
         figure.savefig(part, dpi=150, metadata=undated.get(path.suffix))
@@ -107,7 +107,7 @@ def save_figure(figure: "Figure", path: Path) -> Path:
 
 
 def json_text(value: Any) -> str:
-    """Return JSON with null for numbers that are not finite."""
+    """Return a value as JSON text, with null for numbers that are not finite."""
     finite = json.loads(json.dumps(value, default=str), parse_constant=lambda _: None)
     return json.dumps(finite, indent=2)
 
@@ -119,13 +119,13 @@ def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[
 
 
 def save_manifest(command: Sequence[str], settings: Mapping[str, Any], files: Sequence[Path], path: Path) -> Path:
-    """Write how files were made: the command's arguments, its settings, and versions.
+    """Write a manifest, which records how files were made: the command, its settings, versions, and the files' names.
 
     Args:
-        command: arguments after `hexmj`.
-        settings: of the results.
-        files: that the command wrote, in the manifest's folder or below it.
-        path: of the manifest.
+        command: arguments of the command line after `hexmj`.
+        settings: settings of the results.
+        files: files that the command wrote, in the manifest's folder or below it.
+        path: file of the manifest.
     """
     versions = {"hexmj": __version__} | {name: version(name) for name in LIBRARIES}
     versions["python"] = platform.python_version()
@@ -138,12 +138,12 @@ def read_manifest(path: Path) -> dict[str, Any]:
     """Read a manifest that `save_manifest` wrote.
 
     Raises:
-        InputError: the file cannot be read, or is no manifest.
+        InputError: the file cannot be read, or is not a manifest.
     """
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {error}") from None
     if not isinstance(manifest, dict) or not {"command", "settings", "versions", "files"} <= manifest.keys():
-        raise InputError(f"{path} is no manifest of a hexmj command")
+        raise InputError(f"{path} is not a manifest; expected a {MANIFEST} that a hexmj command wrote")
     return manifest

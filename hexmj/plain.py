@@ -1,4 +1,4 @@
-"""Settings as plain data, for the attributes of results and for cache keys."""
+"""Settings as plain data (numbers, texts, lists and dicts), for the attributes of results and for cache keys."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -14,20 +14,20 @@ from hexmj.errors import InputError
 from hexmj.validate import short
 
 Visit = Callable[[Any], None]
-"""Receives the classes and functions that settings consist of."""
+"""Function that receives each class and function in a setting."""
 
 
-def plain(value: Any, visit: Visit = lambda thing: None) -> Any:
-    """Return a setting as JSON can hold it: a dataclass or enumeration with its class, an array as a list.
+def plain(value: Any, visit: Visit = lambda definition: None) -> Any:
+    """Convert a setting to data for JSON: an array becomes a list, a dataclass a dict of its class and fields.
 
-    A path, or a text with a dot, that names a file becomes the file's name and a digest of its content.
+    If a path, or a text with a dot, is an existing file, it becomes the file's name and a digest of its content.
 
     Args:
         value: a number, text, path, array, dataclass, enumeration, class, function, or a list or dict of these.
-        visit: called with every class and function.
+        visit: function that is called with every class and function in the value.
 
     Raises:
-        InputError: the value is something else.
+        InputError: the value, or a part of it, has another type.
     """
     match value:
         case Enum():
@@ -53,15 +53,15 @@ def plain(value: Any, visit: Visit = lambda thing: None) -> Any:
         case Mapping():
             return {str(key): plain(item, visit) for key, item in value.items()}
     raise InputError(
-        f"{short(value)} is no setting; expected a number, text, path, array, dataclass, or a list or dict"
+        f"{short(value)} cannot be a setting; expected a number, text, path, array, dataclass, or a list or dict"
     )
 
 
 def digest(content: bytes) -> str:
-    """Return the first digits of the SHA-256 of some bytes."""
+    """Return the first twelve hexadecimal digits of the SHA-256 of `content`."""
     return hashlib.sha256(content).hexdigest()[:12]
 
 
-def _label(thing: Any, visit: Visit) -> str:
-    visit(thing)
-    return f"{thing.__module__}:{thing.__qualname__}"
+def _label(definition: Any, visit: Visit) -> str:
+    visit(definition)
+    return f"{definition.__module__}:{definition.__qualname__}"

@@ -1,4 +1,4 @@
-"""Progress of long work on standard error."""
+"""Progress bars of long work, on standard error."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -6,17 +6,17 @@ from contextlib import contextmanager
 from typing import Any
 
 Progress = Callable[[float], None]
-"""Receives the fraction of the work that was done since the last call."""
+"""Progress function: it is called with the fraction of the work that was done since its last call."""
 
 EVERY = 5.0
-"""Time between two states of a bar that is not in a terminal, such as in a log file [s]."""
+"""Time between two updates of a progress bar outside a terminal, such as in a log file [s]."""
 
 COMPILING = "the first run compiles, for up to a minute"
 
 
 @contextmanager
 def shown(progress: Progress | bool | None, label: str) -> Iterator[Progress | None]:
-    """Provide the progress function of a block: the caller's, a bar for True, None for False or None."""
+    """Provide the progress function of a block: `progress` if it is a function, a new bar for True, otherwise None."""
     if progress is True:
         with progress_bar(label) as advance:
             yield advance
@@ -26,12 +26,12 @@ def shown(progress: Progress | bool | None, label: str) -> Iterator[Progress | N
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Progress]:
-    """Show the progress of a block, which calls the function that this yields, from any thread."""
+    """Show a progress bar during a block, and provide its progress function, which any thread may call."""
     from tqdm import tqdm
 
-    how: Any = {"mininterval": 0.1} if sys.stderr.isatty() else {"mininterval": EVERY, "delay": EVERY}
-    how |= {"bar_format": "{desc}: {percentage:.0f} %{bar}{elapsed}, {remaining} left", "leave": False}
-    with tqdm(desc=f"{label} ({COMPILING})", total=1.0, smoothing=0.0, **how) as bar:
+    style: Any = {"mininterval": 0.1} if sys.stderr.isatty() else {"mininterval": EVERY, "delay": EVERY}
+    style |= {"bar_format": "{desc}: {percentage:.0f} %{bar}{elapsed}, {remaining} left", "leave": False}
+    with tqdm(desc=f"{label} ({COMPILING})", total=1.0, smoothing=0.0, **style) as bar:
 
         def advance(done: float) -> None:
             with bar.get_lock():
@@ -42,5 +42,5 @@ def progress_bar(label: str) -> Iterator[Progress]:
 
 
 def part_of(progress: Progress | None, part: float) -> Progress | None:
-    """Return the progress function of a part of some work."""
+    """Return a progress function for work that is the fraction `part` of the work of `progress`."""
     return progress and (lambda done: progress(part * done))

@@ -41,41 +41,41 @@ LIBRARIES = ("mujoco", "numpy", "scipy", "numba")
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell of a sweep. Its result depends on nothing but the function and its settings."""
+    """One cell of a sweep. Its result depends only on the function and the settings."""
 
     name: str
-    """Begins the name of the cell's file."""
+    """Readable beginning of the name of the cell's file."""
     function: Callable[..., Any]
-    """Function of a module, or a method of a frozen dataclass; returns an `xarray.Dataset`. If it has the arguments
-    `threads` or `progress`, the sweep provides them."""
+    """Function of a module, or method of a frozen dataclass, that returns an `xarray.Dataset`. The sweep passes
+    `threads` and `progress` if the function has these arguments."""
     settings: Mapping[str, Any]
     """Arguments of the function: numbers, texts, paths, arrays, frozen dataclasses, or lists and dicts of these."""
     work: float = 1.0
-    """Relative cost, for the progress bar."""
+    """Relative computing time of the cell, for the progress bar."""
 
     def compute(self, *first: Any, **execution: Any) -> Any:
-        """Call the function with its settings and with those execution arguments that it takes."""
+        """Call the function with `first`, its settings, and the arguments of `execution` that the function has."""
         accepted = signature(self.function).parameters
         return self.function(*first, **self.settings, **{k: v for k, v in execution.items() if k in accepted})
 
     def record(self) -> str:
-        """Return the function, its settings, sources and versions as JSON.
+        """Return the cache key as JSON: the function, its settings, the sources and the versions.
 
         Raises:
             InputError: a setting cannot be written as JSON.
         """
-        things: list[Any] = []
+        definitions: list[Any] = []
         record = {
-            "function": plain(self.function, things.append),
-            "of": plain(getattr(self.function, "__self__", None), things.append),
-            "settings": plain(self.settings, things.append),
+            "function": plain(self.function, definitions.append),
+            "of": plain(getattr(self.function, "__self__", None), definitions.append),
+            "settings": plain(self.settings, definitions.append),
         }
-        record["sources"] = _user_sources(things) | {"hexmj": _package_digest()}
+        record["sources"] = _user_sources(definitions) | {"hexmj": _package_digest()}
         record["versions"] = {name: version(name) for name in LIBRARIES}
         return json.dumps(record, sort_keys=True)
 
     def stem(self, record: str) -> str:
-        """Return the name of the cell's file without its suffix."""
+        """Return the name of the cell's file without suffix: the cell's name and a digest of its cache key `record`."""
         readable = re.sub(r"[^A-Za-z0-9.+-]+", "-", self.name)[:100].lstrip(".-")
         return f"{readable}-{digest(record.encode())}"
 
@@ -84,11 +84,11 @@ class Study(Protocol):
     """A frozen dataclass of settings that defines cells and combines their results."""
 
     def cells(self) -> Sequence[Cell]:
-        """Return the cells to be computed."""
+        """Return the cells that must be computed for the result."""
         ...
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Combine the results of the cells, given in their order."""
+        """Combine the results of the cells, which `data` holds in the order of `cells`."""
         ...
 
 
@@ -96,14 +96,14 @@ class Execution(TypedDict, total=False):
     """How cells are computed; results do not depend on it."""
 
     executor: Executor | None
-    """Computes the cells in threads, in processes or on other machines that see the folder; by default they are
-    computed in this process, one after another."""
+    """Executor that computes the cells in threads, in processes or on other machines that share the folder; by default,
+    this process computes the cells one after another."""
     progress: Progress | bool | None
-    """True shows a bar; a function receives the fraction done since its last call."""
+    """True shows a progress bar; a function is called with the fraction of the work done since its last call."""
     threads: int | None
-    """Threads of each cell; by default one per core, and one with an executor."""
+    """Number of threads of each cell; by default one per core, or one if there is an executor."""
     fresh: bool
-    """Compute all cells again, and replace those in the folder."""
+    """True computes all cells again and replaces their cached results."""
 
 
 def run_study(study: Study, folder: Path | str | None = None, **execution: Unpack[Execution]) -> "xr.Dataset":
@@ -126,13 +126,13 @@ def finished_cells(
     """Compute cells and yield each with its index as soon as it is finished.
 
     Args:
-        cells: to be computed.
-        folder: caches one file per cell; cells that are there are read instead of computed. None caches nothing.
+        cells: cells to compute.
+        folder: cache with one file per cell; a cell with a file is read, not computed. None caches nothing.
         execution: see `Execution`.
 
     Raises:
-        InputError: a setting cannot be part of a cache key, or a worker process died. Any error of a cell, with a note
-            that names the cell.
+        InputError: a setting cannot be part of a cache key, or a worker process died. An error of a cell is raised with
+            a note that names the cell.
     """
     executor, progress = execution.get("executor"), execution.get("progress")
     threads, total, done = execution.get("threads"), sum(cell.work for cell in cells), [0.0] * len(cells)
@@ -150,8 +150,8 @@ def finished_cells(
             progress(fraction * cells[i].work / total)
 
     if executor is None:
-        how = ((i, {"threads": threads, "progress": partial(advance, i)}) for i in range(len(cells)))
-        computed = ((i, _computed(cells[i], paths[i], **arguments)) for i, arguments in how)
+        each = ((i, {"threads": threads, "progress": partial(advance, i)}) for i in range(len(cells)))
+        computed = ((i, _computed(cells[i], paths[i], **arguments)) for i, arguments in each)
     else:
         computed = _on_executor(executor, cells, paths, threads or 1)
     for i, data in computed:
@@ -160,7 +160,7 @@ def finished_cells(
 
 
 def _computed(cell: Cell, path: Path | None, **execution: Any) -> "xr.Dataset":
-    """Return a cell's result, from its file if that is there."""
+    """Return a cell's result: read its file if that exists, else compute the cell and write the file."""
     if path and path.exists():
         return _cached(path)
     try:
@@ -174,7 +174,7 @@ def _computed(cell: Cell, path: Path | None, **execution: Any) -> "xr.Dataset":
 
 
 def _cached(path: Path) -> "xr.Dataset":
-    """Read a cell's result without the attribute that only its file has."""
+    """Read a cell's result from its file, without the attribute `cell`, which holds the cache key."""
     data = read_netcdf(path)
     data.attrs.pop("cell", None)
     return data
@@ -191,7 +191,7 @@ def _on_executor(
             yield futures[future], future.result()
     except BrokenExecutor:
         raise InputError(
-            "A worker process died. Finished cells are cached: start again, with fewer processes if memory ran out."
+            "A worker process died. Finished cells are cached. Run again, with fewer processes if memory ran out."
         ) from None
     finally:
         for future in futures:
@@ -203,13 +203,13 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
 
     Args:
         sizes: number of cells along each axis; the last axis varies fastest, as in `itertools.product`.
-        data: results of all cells.
-        concat: options of `xarray.concat`.
+        data: results of all cells, in this order.
+        concat: keyword arguments of `xarray.concat`.
     """
     import xarray as xr
 
     if (count := math.prod(sizes.values())) != len(data):
-        raise InputError(f"{len(data)} cells along {dict(sizes)}; expected {count}")
+        raise InputError(f"{len(data)} cells for axes of the sizes {dict(sizes)}; expected {count}")
     rows = list(data)
     for name, size in reversed(list(sizes.items())):
         rows = [xr.concat(rows[i : i + size], name, **concat) for i in range(0, len(rows), size)]
@@ -217,22 +217,22 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
 
 
 class CachedValues:
-    """A function of rows that computes every row once, and caches the values in a text file.
+    """A function of rows of numbers that computes the value of every row once and caches the values in a text file.
 
-    It calls `function(rows, **settings)`, (row, number) -> (row,), which must treat each row by itself. Every line of
-    the file is one row and its value, in hexadecimal; a last line that was torn by a kill is ignored.
+    The function of the cell, (row, number) -> (row,), must compute each value from its row alone. Each line of the file
+    holds a row and its value in hexadecimal; an incomplete line, left by a killed process, is ignored.
     """
 
     def __init__(
         self, cell: Cell, folder: Path | str | None = None, *, threads: int | None = None, fresh: bool = False
     ) -> None:
-        """Read the values that the folder holds.
+        """Read the values that are cached in the folder.
 
         Args:
-            cell: function, settings and name.
-            folder: holds the file; None keeps values in memory.
-            threads: for the function, if it takes them.
-            fresh: discard the values in the file.
+            cell: function of the rows, with its settings and its name.
+            folder: folder of the text file; None keeps the values in memory only.
+            threads: number of threads, passed to the function if it has this argument.
+            fresh: True discards the values in the file.
         """
         self._cell, self._threads, self._path = cell, threads, None
         self._values: dict[bytes, float] = {}
@@ -246,7 +246,7 @@ class CachedValues:
         self._replayed: set[bytes] = set()
 
     def __call__(self, rows: np.ndarray) -> np.ndarray:
-        """Return the values, (row,), of rows (row, number)."""
+        """Return the values, (row,), of `rows`, (row, number); only new rows are computed."""
         rows = np.ascontiguousarray(rows, dtype=float)
         keys = [row.tobytes() for row in rows]
         self._replayed |= self._read.intersection(keys)
@@ -261,13 +261,13 @@ class CachedValues:
 
     @property
     def replayed(self) -> int:
-        """Number of distinct rows whose values came from the file."""
+        """Number of distinct rows whose values were read from the file instead of computed."""
         return len(self._replayed)
 
 
 def _read_values(path: Path) -> Iterator[tuple[bytes, float]]:
     for line in path.read_text().splitlines(keepends=True) if path.exists() else ():
-        with suppress(ValueError):  # an empty or a torn line
+        with suppress(ValueError):  # an empty or incomplete line
             row, value = line.split()
             if line.endswith("\n"):
                 yield bytes.fromhex(row), float.fromhex(value)
@@ -279,7 +279,7 @@ def workers(processes: int = 1, scheduler: str | None = None) -> Iterator[Execut
 
     Args:
         processes: number of processes.
-        scheduler: address such as "tcp://127.0.0.1:8786"; its workers must see the results' folder.
+        scheduler: address such as "tcp://127.0.0.1:8786"; the workers must share the folder of the results.
     """
     if scheduler is not None:
         try:
@@ -300,13 +300,13 @@ def workers(processes: int = 1, scheduler: str | None = None) -> Iterator[Execut
 
 
 def threads_each(threads: int | None, processes: int) -> int | None:
-    """Return the threads of each process: as given, else the cores shared among several processes."""
+    """Return the threads of each process: `threads`, or by default an equal share of the cores (None for all cores)."""
     return threads if threads is not None or processes == 1 else max(1, cores() // processes)
 
 
 def _end_with_parent() -> None:
-    """End this worker when its parent ends, however that happens; the initializer of a pool's processes."""
-    sys.stdout = sys.stderr  # output of a user's code is not the command's answer
+    """Initialise a worker process of a pool so that it exits when its parent process ends, also after a kill."""
+    sys.stdout = sys.stderr  # the user's code must not print into the command's answer
 
     def watch() -> None:
         if parent := parent_process():
@@ -316,18 +316,18 @@ def _end_with_parent() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _user_sources(things: Iterable[Any]) -> dict[str, str]:
-    """Digests of the source files of the user's classes and functions and of the `.py` files beside them, by module."""
+def _user_sources(definitions: Iterable[Any]) -> dict[str, str]:
+    """Return module of the user's classes and functions -> digest of its file and the `.py` files in its folder."""
     found = {}
-    for thing in things:
-        name = thing.__module__
+    for definition in definitions:
+        name = definition.__module__
         if name.partition(".")[0] in sys.stdlib_module_names | {"hexmj", "numpy"} - {"__main__"}:
             continue
-        if "<locals>" in thing.__qualname__ or "<lambda>" in thing.__qualname__:
-            raise InputError(f"{thing.__qualname__} cannot be cached; expected a function or class of a module")
+        if "<locals>" in definition.__qualname__ or "<lambda>" in definition.__qualname__:
+            raise InputError(f"{definition.__qualname__} cannot be cached; define it at the top level of a module")
         file = getattr(sys.modules.get(name), "__file__", None)
         beside = {Path(file), *Path(file).parent.glob("*.py")} if file else None
-        found[name] = _files_digest(beside) if beside else digest(getsource(thing).encode())
+        found[name] = _files_digest(beside) if beside else digest(getsource(definition).encode())
     return found
 
 
