@@ -289,8 +289,8 @@ def test_without_a_display_the_command_draws_with_egl_or_says_what_is_missing():
     )
     for use, variables, expected in (
         ("use()", {}, "False None"),
-        ("use()", {"MUJOCO_GL": "disable"}, "True Nothing can be rendered here"),
-        ("", {"MUJOCO_GL": "glfw"}, "True Nothing can be rendered here"),
+        ("use()", {"MUJOCO_GL": "disable"}, "True This machine cannot render"),
+        ("", {"MUJOCO_GL": "glfw"}, "True This machine cannot render"),
     ):
         words = [sys.executable, "-W", "error", "-c", program.format(use)]
         done = subprocess.run(words, env=kept | variables, capture_output=True, text=True, check=True)
