@@ -1,6 +1,6 @@
-"""Description of a six-legged body: its MJCF, the names in it, the lengths behind its limits; and the stick insect.
+"""`Body`, the description of a six-legged body: its MJCF file, the names in it and its lengths; and the stick insect.
 
-Units are mm, g, s and rad, forces g mm/s^2, in the MJCF too.
+Units are mm, g, s and rad, also in the MJCF; forces are in g mm/s^2.
 """
 
 import math
@@ -13,106 +13,106 @@ from hexmj.errors import InputError
 from hexmj.legs import FIG1, LEGS, Geometry
 
 ROOT_QPOS = 7
-"""Numbers of `qpos` before the joints: the free root's position (3) and unit quaternion (4)."""
+"""Number of elements of `qpos` before the joints: the free root's position (3) and unit quaternion (4)."""
 
 ROOT_QVEL = 6
-"""Numbers of `qvel` before the joints: the free root's velocity (3) and angular velocity (3)."""
+"""Number of elements of `qvel` before the joints: the free root's velocity (3) and angular velocity (3)."""
 
 FEWEST_JOINTS = 3
-"""Hinges that a leg needs to put its foot anywhere in space."""
+"""Minimum number of hinges of a leg; with fewer, a foot cannot move in all three directions."""
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One leg by its names in the MJCF."""
+    """One leg, described by names in the MJCF."""
 
     joints: tuple[str, ...]
-    """Its hinges from the body outwards, each with a range."""
+    """Names of the leg's hinges from the body outwards; each hinge must have a range."""
     foot: str
-    """The site at its tip, and the sphere around it that stands on the ground."""
+    """Name of the site at the leg's tip, and of the sphere around this site that stands on the ground."""
     parts: tuple[str, ...]
-    """The bodies whose mass is the leg's; the foot's is one of them."""
+    """Names of the bodies whose mass counts as the leg's mass; the body that has the foot is one of them."""
 
 
 @dataclass(frozen=True)
 class Servo:
-    """What the gains of the joints are computed from, see `bodies.mjcf`."""
+    """Settings from which `bodies.mjcf` computes the gains of the joints' servos."""
 
     step: float = 0.001
-    """The time step for which the joints are as stiff as it allows [s]."""
+    """The joints get the greatest stiffness that this time step allows [s]."""
     damping_ratio: float = 1.0
-    """Of the lightest motion of each joint; 1 is critical."""
+    """Damping ratio of each servo, as MuJoCo's `dampratio`; 1 is critical damping."""
     digits: int = 2
-    """Significant digits of the gains."""
+    """Number of significant digits to which the gains are rounded."""
 
 
 @dataclass(frozen=True)
 class Lengths:
-    """The lengths, and one speed, that limits and tolerances are made of; by default those of the stick insect."""
+    """Lengths and speeds from which limits and tolerances are computed; the defaults are those of the stick insect."""
 
     highest_lift: float = 14.0
-    """Greatest height to which a swinging foot is lifted [mm]."""
+    """Maximum height to which a swinging foot can be lifted [mm]."""
     highest_stand: float = 14.0
-    """Greatest standing height [mm]."""
+    """Maximum standing height [mm]."""
     slowest_swing: float = 0.1
-    """Least velocity V_p of a protracting tip relative to the body [mm/s]."""
+    """Minimum velocity V_p of a protracting tip relative to the body [mm/s]."""
     fastest_swing: float = 2000.0
-    """Greatest velocity V_p [mm/s]."""
+    """Maximum velocity V_p of a protracting tip relative to the body [mm/s]."""
     shortest_leg: float = 31.0
-    """Length of the shortest leg [mm]: no obstacle is taller, and a gap is as deep."""
+    """Length of the shortest leg [mm]; it is also the maximum height of an obstacle and the depth of a gap."""
     farthest_centre_of_mass: float = 30.0
-    """How far the centre of mass may be moved ahead or back [mm]."""
+    """Maximum distance of the centre of mass from O, ahead or to the rear [mm]."""
     load_gyration: float = 2.0
-    """Radius of gyration of what is carried [mm]."""
+    """Radius of gyration of the load (`Conditions.load`) [mm]."""
     nearest_obstacle: float = 45.0
-    """Least distance of what lies ahead from O at the start, ahead of the front feet [mm]."""
+    """Minimum distance from O at the start to an obstacle, which must lie ahead of the front feet [mm]."""
     farthest_obstacle: float = 10000.0
-    """Greatest distance of what lies ahead from O at the start [mm]."""
+    """Maximum distance from O at the start to an obstacle [mm]."""
     longest_obstacle: float = 1000.0
-    """Greatest length of a gap or a hurdle along the way [mm]."""
+    """Maximum length of a gap or a hurdle in the direction of walking [mm]."""
     highest_bump: float = 8.0
-    """Height of the highest bump of rough ground [mm]; bumps are caps of spheres, twice as wide."""
+    """Maximum height of the bumps of rough ground [mm]; all bumps are caps of spheres, 2 `highest_bump` wide."""
     bump_spacing: float = 12.0
-    """Distance of the bumps' centres [mm]; neighbours leave only small gaps."""
+    """Distance between the centres of neighbouring bumps [mm]; only small gaps remain between bumps."""
     ground_half_width: float = 200.0
-    """Half the width of everything that lies ahead [mm]."""
+    """Half the width of a step, a gap or a hurdle, across the direction of walking [mm]."""
     ground_reach: float = 1000.0
-    """How far steps and the banks of a gap reach [mm]."""
+    """Length of a step, and of each bank of a gap, in the direction of walking [mm]."""
     speed_at_rest: float = 5.0
-    """Speed of the root below which a start counts as settled [mm/s]."""
+    """Maximum speed of the root at which a start counts as settled [mm/s]."""
     tracking_bin: float = 0.01
-    """Width of the bins in which distances of feet from their targets are counted [mm]."""
+    """Width of a bin in the histogram of the distances between feet and their targets [mm]."""
     tracking_bins: int = 2000
-    """Number of these bins; greater distances are counted together."""
+    """Number of bins in the histogram of the distances between feet and their targets; one more bin is unbounded."""
     largest_tip_offset: float = 5.0
-    """Greatest offset of a planned tip in each direction that an environment's action may ask for [mm]."""
+    """Maximum distance, in each direction, by which an environment's action can shift a planned tip [mm]."""
     no_foot_margin: float = -100.0
-    """Stands for the stability margin of a body without a foot on the ground [mm]; a foot in contact gives more,
-    since no leg reaches so far."""
+    """Stability margin that is reported while no foot is on the ground [mm]. It is below every margin with a foot on
+    the ground, since no leg reaches so far."""
 
     @property
     def lowest_bump(self) -> float:
-        """Least height of the highest bump of rough ground [mm].
+        """Minimum of `Conditions.ground_height` on rough ground [mm].
 
-        Lower ones are caps of spheres so large, of radius `highest_bump`^2 / 2 h, that a foot touches many at once,
-        which makes the ground harder and slower to compute: at 0.1 mm four, at 0.0001 mm fifty.
+        A bump of small height h is the cap of a sphere of radius `highest_bump`^2 / 2 h. If h is too small a foot
+        touches many such spheres at once, which is harder and slower to compute: four at 0.1 mm, fifty at 0.0001 mm.
         """
         return self.highest_bump / 80.0
 
     def scaled(self, factor: float) -> "Lengths":
-        """The lengths of a body so many times as large; speeds grow with them, the number of bins does not."""
+        """Return the lengths of a body `factor` times as large; speeds grow likewise, the number of bins does not."""
         values = {field.name: getattr(self, field.name) * factor for field in fields(self)}
         return Lengths(**(values | {"tracking_bins": self.tracking_bins}))
 
 
 @dataclass(frozen=True)
 class Marks:
-    """Sizes of the marks that a film draws on the ground and at the tips [mm]."""
+    """Sizes of the marks that a film shows on the ground and at the tips [mm]."""
 
     fill_height: float = 0.05
-    """Height of the support polygon's area over the ground; its outline lies on the ground."""
+    """Height of the filled support polygon above the ground; the outline of the polygon lies on the ground."""
     outline: float = 0.45
-    """Radius of the polygon's outline."""
+    """Radius of the rods that outline the support polygon."""
     plumb_line: float = 0.12
     """Radius of the line from the centre of mass down to the ground."""
     rim: tuple[float, float] = (2.4, 0.3)
@@ -125,39 +125,39 @@ class Marks:
 
 @dataclass(frozen=True)
 class Body:
-    """A six-legged body, described so that it can be compiled, loaded with masses, put on any ground and walked."""
+    """Description of a six-legged body: all that is needed to compile it, load it and let it walk on any ground."""
 
     name: str
-    """What it is called where bodies are listed."""
+    """Name of the body in lists, results and error messages."""
     mjcf: Path
-    """Its MJCF file; may include others and refer to meshes beside it."""
+    """Path of the MJCF file, which may include other files and refer to meshes beside it."""
     root: str
-    """Body with the free joint.  Its frame is at O: x forward, y left, z up."""
+    """Name of the body with the free joint. The origin of its frame is O; x points forward, y left and z up."""
     trunk: tuple[str, ...]
-    """Parts from front to rear, names of bodies and of their geoms, that fall on the ground; they carry the mass that
-    is not the legs'."""
+    """Names of the trunk's parts from front to rear. Each is the name of a body, and of the geom that touches the
+    ground in a fall; these bodies have all of the mass that is not the legs'."""
     legs: tuple[Leg, ...]
-    """The six legs in the order of `LEGS`."""
+    """The six legs in the order of `hexmj.legs.LEGS`."""
     ground: str
-    """Geom of the plane on which it stands."""
+    """Name of the geom of the plane on which the body stands."""
     home: str
-    """Keyframe in which the feet stand on the origins of their lines."""
+    """Name of the keyframe in which each foot stands on the origin of its line."""
     cameras: tuple[str, ...]
-    """From which it can be filmed."""
+    """Names of the cameras that can film the body."""
     lines: Geometry
-    """Lines of the tips in posture `home`."""
+    """Lines on which the tips move, with their origins, on which the tips stand in posture `home`."""
     standing_height: float
     """Height of the root's frame above the tips in posture `home` [mm]."""
     longest_step: float
-    """Longest time step that its gains and contacts allow [s]."""
+    """Maximum physics step that the gains and contacts allow [s]."""
     mass: float
-    """Its own mass [g]."""
+    """Mass of the body without load [g]."""
     servo: Servo
-    """What its gains are computed from."""
+    """Settings from which the gains of the servos are computed."""
     lengths: Lengths
-    """What limits and tolerances are made of."""
+    """Lengths from which limits and tolerances are computed."""
     marks: Marks
-    """Sizes of a film's marks."""
+    """Sizes of the marks that a film shows."""
 
     def __repr__(self) -> str:
         return f"Body({self.name!r}, {self.mjcf.name})"
@@ -173,25 +173,25 @@ class Body:
             if not 0 < number < math.inf:
                 yield f"{name} = {number}; expected a finite number above 0"
         if not self.mjcf.is_file():
-            yield f"mjcf = {str(self.mjcf)!r} is no file; expected the body's MJCF"
+            yield f"mjcf = {str(self.mjcf)!r} is not a file; expected the path of the body's MJCF"
         if not self.trunk:
-            yield "trunk = (); expected the names of at least one part"
+            yield "the trunk has no parts; expected the name of at least one"
         if len(self.legs) != len(LEGS):
             yield f"{len(self.legs)} legs; expected {len(LEGS)}, in the order {', '.join(LEGS)}"
         numbers = [len(leg.joints) for leg in self.legs]
         if len(set(numbers)) > 1 or numbers[0] < FEWEST_JOINTS:
             has, least = ", ".join(map(str, numbers)), FEWEST_JOINTS
-            yield f"its legs have {has} joints; expected equally many in each, at least {least}"
+            yield f"numbers of joints of the legs: {has}; expected the same number for all, at least {least}"
         parts = tuple(part for leg in self.legs for part in leg.parts)
-        yield from (f"trunk part {name!r} is a leg's; expected other parts" for name in self.trunk if name in parts)
+        yield from (f"trunk part {name!r} is also in a leg; expected it once" for name in self.trunk if name in parts)
         named = {"joints": self.joints, "feet": self.feet, "trunk": self.trunk, "parts of legs": parts}
         for kind, names in named.items():
             twice = (name for i, name in enumerate(names) if name in names[:i])
-            yield from (f"{kind} name {name!r} twice; expected every name once" for name in twice)
+            yield from (f"{kind}: the name {name!r} occurs twice; expected it once" for name in twice)
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of all joints, leg by leg, each leg's from the body outwards."""
+        """Names of all joints, leg by leg; the joints of a leg are in order from the body outwards."""
         return tuple(joint for leg in self.legs for joint in leg.joints)
 
     @property
@@ -201,14 +201,14 @@ class Body:
 
 
 JOINTS = ("thorax_coxa", "coxa_trochanter", "femur_tibia")
-"""A leg's joints from the body outwards; their angles are protraction, levation, the knee's inner angle."""
+"""Joints of a leg from the body outwards; their angles are protraction, levation and the inner angle of the knee."""
 
 PARTS = ("coxa", "femur", "tibia")
-"""A leg's parts from the body outwards; the tibia includes the tarsus."""
+"""Parts of a leg from the body outwards; the tibia includes the tarsus."""
 
 
 def _mjcf() -> Path:
-    """The file in the wheel, else in the repository."""
+    """Return the path of the stick insect's MJCF in the installed package, or else in the repository."""
     packaged = Path(str(files("hexmj"))) / "assets"
     folder = packaged if packaged.is_dir() else Path(__file__).parents[1] / "assets"
     return folder / "stick_insect.xml"
@@ -238,4 +238,4 @@ STICK_INSECT = Body(
     lengths=Lengths(),
     marks=Marks(),
 )
-"""The insect of this package; standing height and times of `hexmj.conditions` are usual for it."""
+"""The stick insect, the default body; the other defaults of `hexmj.Conditions` are chosen for it."""

@@ -1,4 +1,4 @@
-"""A compiled body: its model, the columns of its joints and sensors, its kinematics and its measures."""
+"""A compiled body: its MuJoCo model, the columns of its joints and sensors, its kinematics and its dimensions."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -21,48 +21,48 @@ class Columns:
     """Columns of joints and sensors in MuJoCo's arrays: ``qpos[..., columns.qpos]`` is (..., leg * joint)."""
 
     qpos: slice
-    """Of `qpos`: angles of the joints, leg by leg, each leg's from the body outwards [rad]."""
+    """Columns of `qpos` with the joint angles, leg by leg, and in each leg from the body outwards [rad]."""
     qvel: slice
-    """Of `qvel` and other arrays over the degrees of freedom: velocities of the joints [rad/s]."""
+    """Columns of `qvel`, and of other arrays over the degrees of freedom, with the joint velocities [rad/s]."""
     ctrl: slice
-    """Of `ctrl` and other arrays over the actuators: targets of the joints [rad]."""
+    """Columns of `ctrl`, and of other arrays over the actuators, with the joint targets [rad]."""
     grasp: slice
-    """Of `ctrl`: adhesion of each foot, 0 to 1, (..., leg); empty without adhesion."""
+    """Columns of `ctrl` with the adhesion of each foot, 0 to 1, (..., leg); empty without adhesion."""
     foot: slice
-    """Of `sensordata`: feet in the world, (..., leg * axis) [mm]; reshape to (leg, 3)."""
+    """Columns of `sensordata` with the feet in the world, (..., leg * axis) [mm]; reshape them to (..., leg, axis)."""
     touch: slice
-    """Of `sensordata`: normal force of the ground on each foot, (..., leg) [g mm/s^2]."""
+    """Columns of `sensordata` with the normal force of the ground on each foot, (..., leg) [g mm/s^2]."""
     trunk: slice
-    """Of `sensordata`: number of contacts of each part of the trunk, (..., part)."""
+    """Columns of `sensordata` with the number of contacts of each part of the trunk, (..., part)."""
     centre_of_mass: slice
-    """Of `sensordata`: centre of mass of the whole body in the world, (..., axis) [mm]."""
+    """Columns of `sensordata` with the centre of mass of the whole body in the world, (..., axis) [mm]."""
     feet_push: slice
-    """Of `sensordata`: force of each foot on the ground in the world, (..., leg * axis) [g mm/s^2]; empty if it is not
-    measured."""
+    """Columns of `sensordata` with the force of each foot on the ground in the world, (..., leg * axis) [g mm/s^2];
+    empty if this force is not measured."""
 
 
 @dataclass(frozen=True, eq=False)
 class CompiledBody:
-    """A body under some conditions, ready to walk."""
+    """A body that is compiled for some conditions and ready to walk."""
 
     model: mujoco.MjModel
-    """The caller's own."""
+    """MuJoCo's model; the caller may change it."""
     conditions: Conditions
-    """Those it was compiled for."""
+    """Conditions for which the body is compiled."""
     columns: Columns
-    """Columns of its joints and sensors."""
+    """Columns of the joints and sensors in MuJoCo's arrays."""
     kinematics: ThreeHinges | HingeChains
-    """In closed form if its legs have one, else numeric."""
+    """Kinematics of the legs, in closed form if it exists, else numeric."""
     foot_radius: float
-    """Height of a standing foot's tip over the ground [mm]."""
+    """Radius of the sphere at a foot: the height of a standing foot's tip above the ground [mm]."""
     trunk_corners: tuple[np.ndarray, np.ndarray]
-    """Corners of the trunk in the root frame, (corner, axis) [mm], and its thickness there, (corner,) [mm]."""
+    """Corners of the trunk, which are spheres: centres in the root frame, (corner, axis), and radii, (corner,) [mm]."""
     home: np.ndarray
     """`qpos` in posture home, (position,)."""
 
     @classmethod
     def of(cls, model: mujoco.MjModel, conditions: Conditions) -> "CompiledBody":
-        """Read the other fields from a model with the sensors of `add_sensors`."""
+        """Return the compiled body of a model that has the sensors of `add_sensors`."""
         body = conditions.body
         return cls(
             model=model,
@@ -76,7 +76,7 @@ class CompiledBody:
 
     @property
     def body(self) -> Body:
-        """Its description."""
+        """Description of the body."""
         return self.conditions.body
 
     @property
@@ -86,7 +86,7 @@ class CompiledBody:
 
     @property
     def root(self) -> int:
-        """MuJoCo's index of the root."""
+        """MuJoCo's index of the root body."""
         return int(self.model.jnt_bodyid[0])
 
     @property
@@ -96,41 +96,41 @@ class CompiledBody:
 
     @property
     def torque_limits(self) -> np.ndarray:
-        """Greatest torque of each joint, (leg * joint,) [g mm^2/s^2]."""
+        """Maximum torque of each joint, (leg * joint,) [g mm^2/s^2]."""
         return self.model.actuator_forcerange[self.columns.ctrl, 1]
 
     def depth(self, feet: np.ndarray) -> np.ndarray:
-        """Depth of feet in the world, (..., axis) [mm], in the ground, (...) [mm]; negative above it."""
+        """Return how deep feet at world positions, (..., axis) [mm], are in the ground [mm]; negative above it."""
         return depth_in_ground(self.conditions, feet, self.foot_radius)
 
     def carried(self, sensors: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Force of the ground on each foot along its normal without adhesion, (..., leg) [g mm/s^2].
+        """Return the normal force of the ground on each foot, without adhesion, (..., leg) [g mm/s^2].
 
-        It is below 0 where adhesion holds a foot that pulls.
+        The force is negative where adhesion holds a foot that pulls.
 
         Args:
             sensors: `sensordata`, (..., column).
-            force: of the actuators, (..., actuator).
+            force: forces of the actuators, (..., actuator).
         """
         touch, adhesion = sensors[..., self.columns.touch], force[..., self.columns.grasp]
         return np.where(touch > 0, touch - adhesion, touch) if adhesion.size else touch.copy()
 
     def inverse(self, tips: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Joint angles that put the tips at these places in the root frame, (..., leg, axis) [mm].
+        """Return the joint angles that put the tips at positions in the root frame, (..., leg, axis) [mm].
 
         Returns:
-            The angles, (..., leg, joint) [rad], NaN where a tip is out of reach of the legs' lengths or the joints'
-            ranges, and whether it is within reach, (..., leg).
+            The angles, (..., leg, joint) [rad], and whether each tip is within reach, (..., leg). The angles are NaN
+            where the length of the leg or the ranges of its joints put the tip out of reach.
         """
         return self.kinematics.inverse(tips)
 
     def forward(self, joints: ArrayLike) -> np.ndarray:
-        """Tips in the root frame, (..., leg, axis) [mm], at joint angles, (..., leg, joint) [rad]."""
+        """Return the tips in the root frame, (..., leg, axis) [mm], at joint angles, (..., leg, joint) [rad]."""
         return self.kinematics.forward(joints)
 
 
 def add_sensors(spec: mujoco.MjSpec, body: Body, pushes: bool) -> None:
-    """Replace the sensors of a spec by those of a walk, in the order of `Columns`, `feet_push` only with `pushes`."""
+    """Replace the sensors of a spec by sensors in the order of `Columns`; `pushes` says whether to add `feet_push`."""
     sensor, objects, field = mujoco.mjtSensor, mujoco.mjtObj, mujoco.mjtConDataField
     count, net_force = [1 << field.mjCONDATA_FOUND.value, 0, 1], [1 << field.mjCONDATA_FORCE.value, 3, 1]
     for own in list(spec.sensors):
@@ -149,7 +149,7 @@ def add_sensors(spec: mujoco.MjSpec, body: Body, pushes: bool) -> None:
 
 
 def _columns(model: mujoco.MjModel, body: Body) -> Columns:
-    """Columns of the joints, and of the sensors that `add_sensors` adds."""
+    """Return the columns of the joints, and of the sensors that `add_sensors` adds."""
     joints, trunk = len(body.joints), len(body.trunk)
     return Columns(
         qpos=slice(ROOT_QPOS, ROOT_QPOS + joints),
@@ -165,7 +165,7 @@ def _columns(model: mujoco.MjModel, body: Body) -> Columns:
 
 
 def _trunk_corners(model: mujoco.MjModel, body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the trunk's capsules, centres of its spheres and corners of its boxes, see `CompiledBody`."""
+    """Return `CompiledBody.trunk_corners`: ends of capsules, centres of spheres and corners of boxes, with radii."""
     data, kinds = posed(model, model.qpos0), mujoco.mjtGeom
     ends, radii = [], []
     for part in body.trunk:

@@ -1,6 +1,6 @@
-"""The ground: a plane and obstacles on it. Only feet and trunk touch it, as contact pairs.
+"""The ground: a plane with obstacles on it. Contact pairs let only the feet and the trunk touch it.
 
-`Conditions.ground` is its kind; `ground_height`, `ground_at`, `ground_length` and `ground_seed` describe it.
+`Conditions.ground` is the kind of ground; `ground_height`, `ground_at`, `ground_length` and `ground_seed` describe it.
 """
 
 import mujoco
@@ -9,20 +9,20 @@ import numpy as np
 from hexmj.conditions import Conditions
 
 BUMPS = (15, 9)
-"""Bumps along the way and across it: a field of 180 by 108 mm if they are 12 mm apart."""
+"""Numbers of bumps along and across the direction of walking: at 12 mm spacing they cover 180 by 108 mm."""
 
 WITH_ENDS = "step", "hurdle", "gap"
-"""Kinds of ground that end after some distance; bumps end on the plane."""
+"""Kinds of ground with edges that an insect must not cross; on flat and rough ground the plane goes on."""
 
 LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
-"""Settings of obstacles: a tint distinguishes them from the plane, whose material they share."""
+"""Settings of an obstacle's geom: contacts only in pairs, and a tint that distinguishes it from the plane."""
 
 CONTACT = ("condim", "friction", "solref", "solimp")
-"""Settings of a contact pair with the plane that pairs with obstacles copy."""
+"""Settings that contact pairs with obstacles copy from the contact pairs with the plane."""
 
 
 def lay_ground(spec: mujoco.MjSpec, conditions: Conditions) -> None:
-    """Add the obstacles to a spec of a body on its plane."""
+    """Add obstacles, and their contact pairs with feet and trunk, to the spec of a body on its plane."""
     body, lengths, kinds = conditions.body, conditions.body.lengths, mujoco.mjtGeom
     near, length, height = conditions.ground_at, conditions.ground_length, conditions.ground_height
     far = lengths.ground_reach
@@ -39,22 +39,22 @@ def lay_ground(spec: mujoco.MjSpec, conditions: Conditions) -> None:
     if conditions.ground == "gap":
         spec.geom(body.ground).pos[2] -= lengths.shortest_leg
     if conditions.ground == "rough":
-        # A sphere pushes a fast foot up and out again. The prisms of a height field would push a foot that is deeper
-        # than its distance from their sides into the next prism, where it stays.
+        # Bumps are spheres, since a sphere pushes a fast foot up and out. A height field consists of prisms: if a foot
+        # is deeper than its distance from the side of a prism, it is pushed into the next prism and stays there.
         for i, ((x, y), top, radius) in enumerate(zip(*_bumps(conditions), strict=True)):
             pieces[f"bump_{i}"] = kinds.mjGEOM_SPHERE, (radius, 0.0, 0.0), (x, y, top - radius)
     look = LOOK | {"material": spec.geom(body.ground).material}
-    alike = {frozenset((pair.geomname1, pair.geomname2)): pair for pair in spec.pairs}
+    with_plane = {frozenset((pair.geomname1, pair.geomname2)): pair for pair in spec.pairs}
     for name, (kind, size, place) in pieces.items():
         spec.worldbody.add_geom(name=name, type=kind, size=size, pos=place, **look)
         for touching in (*body.trunk, *body.feet):
             pair = spec.add_pair(name=f"{name}_{touching}", geomname1=name, geomname2=touching)
             for setting in CONTACT:
-                setattr(pair, setting, getattr(alike[frozenset((body.ground, touching))], setting))
+                setattr(pair, setting, getattr(with_plane[frozenset((body.ground, touching))], setting))
 
 
 def ground_level(conditions: Conditions, places: np.ndarray) -> np.ndarray:
-    """Height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 on the plane."""
+    """Return the height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 on the plane."""
     lengths = conditions.body.lengths
     x = places[..., 0]
     if conditions.ground == "rough":
@@ -68,9 +68,9 @@ def ground_level(conditions: Conditions, places: np.ndarray) -> np.ndarray:
 
 
 def beyond_the_ground(conditions: Conditions, feet: np.ndarray) -> np.ndarray:
-    """Whether feet, spheres around (..., 3) in the world [mm], are beyond the end of the ground, (...).
+    """Return whether feet with centres in the world, (..., 3) [mm], are beyond the edges of the ground, (...).
 
-    Only the kinds of `WITH_ENDS` end.
+    Only the kinds of ground in `WITH_ENDS` have edges.
     """
     lengths = conditions.body.lengths
     x, y, near, far = feet[..., 0], feet[..., 1], conditions.ground_at, lengths.ground_reach
@@ -83,9 +83,9 @@ def beyond_the_ground(conditions: Conditions, feet: np.ndarray) -> np.ndarray:
 
 
 def depth_in_ground(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:
-    """Depth of feet, spheres of a radius around (..., 3) in the world [mm], in the ground, (...) [mm].
+    """Return how deep spherical feet with centres in the world, (..., 3) [mm], are in the ground, (...) [mm].
 
-    It is MuJoCo's depth along the normal; negative above the ground.
+    The depth is MuJoCo's, along the normal of the contact; it is negative above the ground.
     """
     lengths = conditions.body.lengths
     z = feet[..., 2]
@@ -103,7 +103,7 @@ def depth_in_ground(conditions: Conditions, feet: np.ndarray, radius: float) -> 
 
 
 def _depth_in_bumps(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:
-    """Depth in the four bumps around a foot; no other bump reaches it."""
+    """Return the greatest depth of each foot in the four bumps around it; no other bump reaches the foot."""
     lengths = conditions.body.lengths
     centres, heights, radii = (values.reshape(*BUMPS, -1) for values in _bumps(conditions))
     corner = np.floor((feet[..., :2] - centres[0, 0]) / lengths.bump_spacing).astype(int)
@@ -117,7 +117,7 @@ def _depth_in_bumps(conditions: Conditions, feet: np.ndarray, radius: float) -> 
 
 
 def _bumps(conditions: Conditions) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centres on a square grid, (bump, 2), heights drawn uniformly up to the height, and radii, (bump,) [mm]."""
+    """Return centres on a square grid, (bump, 2), random heights up to `ground_height`, and radii, (bump,) [mm]."""
     lengths = conditions.body.lengths
     along, across = BUMPS
     x = conditions.ground_at + lengths.highest_bump + lengths.bump_spacing * np.arange(along)

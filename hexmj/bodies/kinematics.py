@@ -1,14 +1,14 @@
 """Kinematics of the legs: from tips to joint angles and back, in closed form or numerically.
 
-Closed form: a leg of three hinges whose segments lie in one vertical plane, which turns about the first hinge's axis.
-Its angles are the biologist's and equal on both sides: protraction (0 across the body axis, positive forward),
+Closed form (`ThreeHinges`): legs of three hinges whose segments lie in one vertical plane, which the first hinge turns.
+The angles are those of biology, with equal signs on both sides: protraction (0 across the body axis, positive forward),
 levation of the second segment (0 horizontal, positive up) and the inner angle of the knee (pi is straight). The knee
 always points up, so the angles are unique.
 
-Numeric: any chain of hinges, by `newton`. With more than three hinges it chooses, of all postures that reach the tip,
-the nearest to posture home. It takes 1.8 instead of 0.05 microseconds for a tip of the stick insect on one core. Where
-a chain is nearly singular a tip can be missed: at most 3 in 1000 random postures of random chains, and none of 10^5
-of the stick insect.
+Numeric (`HingeChains`): any chain of hinges, solved by `newton`. With more than three hinges many postures reach a tip;
+the posture nearest to home is chosen. A tip of the stick insect takes 1.8 microseconds on one core, instead of 0.05 in
+closed form. Nearly singular chains can fail to reach a tip that is within reach: at most 3 in 1000 random postures of
+random chains, and none of 10^5 of the stick insect.
 """
 
 import math
@@ -29,33 +29,33 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 SAMPLES, SAME = 32, 1e-9
-"""Number of postures in which a chain is compared with the closed form, and tolerance of the tips [mm]."""
+"""Number of random postures in which closed form and numeric form are compared, and tolerance of the tips [mm]."""
 
 
 class ThreeHinges(NamedTuple):
-    """Six legs of three hinges in the root frame (x forward, y left, z up)."""
+    """Kinematics in closed form of six legs of three hinges, in the root frame (x forward, y left, z up)."""
 
     coxa_position: Floats
-    """First hinges, (leg, axis) [mm]."""
+    """Positions of the first hinges, (leg, axis) [mm]."""
     coxa: Floats
-    """First to second hinge, (leg,) [mm]."""
+    """Length of the coxa, from the first to the second hinge, (leg,) [mm]."""
     femur: Floats
-    """Second hinge to knee, (leg,) [mm]."""
+    """Length of the femur, from the second hinge to the knee, (leg,) [mm]."""
     tibia: Floats
-    """Knee to tip, (leg,) [mm]."""
+    """Length of the tibia, from the knee to the tip, (leg,) [mm]."""
     side: Floats
-    """+1 on the left, -1 on the right, (leg,)."""
+    """Side of the body: +1 left, -1 right, (leg,)."""
     joint_range: Floats
-    """Least and greatest angle of each joint, (leg, joint, 2) [rad]."""
+    """Minimum and maximum angle of each joint, (leg, joint, 2) [rad]."""
 
     def inverse(self, tips: ArrayLike) -> tuple[Floats, Bools]:
-        """See `compiled.CompiledBody.inverse`."""
+        """Return joint angles for tips, see `CompiledBody.inverse`."""
         return _over_tips(_solve, tips, tuple(self))
 
     def forward(self, joints: ArrayLike) -> Floats:
-        """See `compiled.CompiledBody.forward`."""
+        """Return tips at joint angles, see `CompiledBody.forward`."""
         protraction, levation, knee = np.moveaxis(np.asarray(joints, dtype=np.float64), -1, 0)
-        pitch = levation + knee - np.pi  # of the tibia above the horizontal
+        pitch = levation + knee - np.pi  # angle of the tibia above the horizontal
         outward = self.coxa + self.femur * np.cos(levation) + self.tibia * np.cos(pitch)
         forward = outward * np.sin(protraction)
         left = self.side * outward * np.cos(protraction)
@@ -64,31 +64,31 @@ class ThreeHinges(NamedTuple):
 
 
 class HingeChains(NamedTuple):
-    """Six chains with the same number of hinges, as the MJCF defines them, in the root frame."""
+    """Numeric kinematics of six chains of equally many hinges, in the root frame and the MJCF's reference posture."""
 
     axis: Floats
-    """Unit vector of each hinge, (leg, joint, axis)."""
+    """Unit vector along the axis of each hinge, (leg, joint, axis)."""
     anchor: Floats
-    """A point on each hinge, (leg, joint, axis) [mm]."""
+    """A point on the axis of each hinge, (leg, joint, axis) [mm]."""
     foot: Floats
-    """The tip, (leg, axis) [mm]."""
+    """Positions of the tips, (leg, axis) [mm]."""
     length: Floats
-    """From the first hinge to the tip of the stretched leg, (leg,) [mm]."""
+    """Distance from the first hinge to the tip of the stretched leg, (leg,) [mm]."""
     zero: Floats
-    """Angles in the MJCF's reference posture, (leg, joint) [rad]."""
+    """Joint angles in the MJCF's reference posture, (leg, joint) [rad]."""
     home: Floats
-    """Angles in posture home, (leg, joint) [rad]."""
+    """Joint angles in posture home, (leg, joint) [rad]."""
     low: Floats
-    """Least angles, (leg, joint) [rad]."""
+    """Minimum joint angles, (leg, joint) [rad]."""
     high: Floats
-    """Greatest angles, (leg, joint) [rad]."""
+    """Maximum joint angles, (leg, joint) [rad]."""
 
     def inverse(self, tips: ArrayLike) -> tuple[Floats, Bools]:
-        """See `compiled.CompiledBody.inverse`."""
+        """Return joint angles for tips, see `CompiledBody.inverse`."""
         return _over_tips(reach, tips, self)
 
     def forward(self, joints: ArrayLike) -> Floats:
-        """See `compiled.CompiledBody.forward`."""
+        """Return tips at joint angles, see `CompiledBody.forward`."""
         turns = np.asarray(joints, dtype=np.float64)[..., np.newaxis] - self.zero[..., np.newaxis]
         place = np.broadcast_to(self.foot, (*turns.shape[:-2], 3))
         for j in reversed(range(turns.shape[-2])):  # from the foot to the body
@@ -100,10 +100,10 @@ class HingeChains(NamedTuple):
 
 
 def kinematics(model: mujoco.MjModel, body: Body) -> ThreeHinges | HingeChains:
-    """Kinematics of a compiled body's legs, in closed form if all of them have one.
+    """Return the kinematics of a compiled body's legs: the closed form if it fits all legs, else the numeric form.
 
-    For it the segments are read as if they lay along the x axes of their bodies. Random postures show whether they do,
-    and whether the angles have the same meaning: there both forms must put the feet at the same places.
+    The closed form assumes that the segments lie along the x axes of their bodies, and that the angles have the meaning
+    above. It fits if both forms put the feet at the same positions in random postures.
     """
     chains, joints = hinge_chains(model, body), joint_numbers(model, body)
     if joints.shape[1] != 3:
@@ -124,7 +124,7 @@ def kinematics(model: mujoco.MjModel, body: Body) -> ThreeHinges | HingeChains:
 
 
 def hinge_chains(model: mujoco.MjModel, body: Body) -> HingeChains:
-    """The chains of a compiled body."""
+    """Return the numeric kinematics of a compiled body's legs."""
     joints, data = joint_numbers(model, body), posed(model, model.qpos0)
     columns = model.jnt_qposadr[joints]
     anchor, foot = data.xanchor[joints], np.array([data.site(foot).xpos for foot in body.feet])
@@ -142,12 +142,12 @@ def hinge_chains(model: mujoco.MjModel, body: Body) -> HingeChains:
 
 
 def joint_numbers(model: mujoco.MjModel, body: Body) -> np.ndarray:
-    """MuJoCo's indices of the legs' joints, (leg, joint)."""
+    """Return MuJoCo's indices of the legs' joints, (leg, joint)."""
     return np.array([[model.joint(joint).id for joint in leg.joints] for leg in body.legs])
 
 
 def posed(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
-    """Positions of all parts with the joints as in `qpos`, (position,), and the root's frame at the world's."""
+    """Return MuJoCo's data with positions for the joint angles in `qpos`, (position,), and the root at the origin."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     data.qpos[:ROOT_QPOS] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
@@ -156,13 +156,13 @@ def posed(model: mujoco.MjModel, qpos: np.ndarray) -> mujoco.MjData:
 
 
 def standing_tips(x: np.ndarray, standing_height: float, stride: Stride) -> np.ndarray:
-    """Tips on the ground in the root frame, (..., leg, 3) [mm], from `x` on their own axes, (..., leg) [mm]."""
+    """Return tips on the ground in the root frame, (..., leg, 3) [mm]; `x` is on the legs' axes, (..., leg) [mm]."""
     tips = x + np.array(stride.geometry.origin), np.broadcast_to(stride.geometry.y, x.shape)
     return np.stack([*tips, np.full(x.shape, -standing_height)], axis=-1)
 
 
 def _over_tips(solve: Callable[..., Any], tips: ArrayLike, legs: Any) -> tuple[Floats, Bools]:
-    """Call a compiled inverse with tips that have any leading axes."""
+    """Call a compiled inverse, which takes (n, leg, axis), for tips with any leading axes."""
     tips = np.ascontiguousarray(tips, dtype=np.float64)
     joints, reachable = solve(tips.reshape(-1, *tips.shape[-2:]), legs)
     leading = tips.shape[:-1]
@@ -171,7 +171,7 @@ def _over_tips(solve: Callable[..., Any], tips: ArrayLike, legs: Any) -> tuple[F
 
 @jitted
 def _solve(tips: Any, legs: Any) -> tuple[Any, Any]:
-    """`ThreeHinges.inverse` for tips of shape (n, leg, axis); `legs` is a plain tuple, which numba unpacks faster."""
+    """Compute `ThreeHinges.inverse` for tips, (n, leg, axis); `legs` is a plain tuple, which numba unpacks faster."""
     coxa_position, coxas, femurs, tibias, side, joint_range = legs
     joints = np.empty(tips.shape)
     reachable = np.empty(tips.shape[:2], dtype=np.bool_)
@@ -181,7 +181,7 @@ def _solve(tips: Any, legs: Any) -> tuple[Any, Any]:
             forward = tips[n, leg, 0] - coxa_position[leg, 0]
             outward = side[leg] * (tips[n, leg, 1] - coxa_position[leg, 1])
             up = tips[n, leg, 2] - coxa_position[leg, 2]
-            # The triangle of femur a, tibia b and c, from the coxa-trochanter joint to the tip.
+            # Triangle of the femur a, the tibia b, and the line c from the coxa-trochanter joint to the tip.
             along = math.sqrt(forward * forward + outward * outward) - coxa
             c = math.sqrt(along * along + up * up)
             if abs(a - b) <= c <= a + b:

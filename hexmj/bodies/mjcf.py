@@ -1,18 +1,18 @@
-"""From a body's MJCF to the model that walks: loading, additions, gains, ground, load and adhesion.
+"""Compilation of a body's MJCF into the model that walks, with gains, ground, load and adhesion.
 
-An MJCF may lack servos and contact pairs, and may name MuJoCo's explicit integrator; these are added or replaced, and
-sensors are always hexmj's own. Nothing changes the stick insect's.
+If an MJCF lacks servos or contact pairs, hexmj adds them. MuJoCo's explicit integrator is replaced by an implicit one,
+and the MJCF's sensors by hexmj's. The stick insect's MJCF already has the right servos, pairs and integrator.
 
-Torque limit of the servos: one leg alone carries the whole weight W where its lever is longest, so it is W times that
-lever. The lever of a hinge is the length of the leg from it to the foot, times the horizontal share of its axis in
+Torque limit of the servos: weight of the body times the longest lever, so that any leg alone can carry the body. The
+lever of a hinge is the length of the leg from the hinge to the foot, times the horizontal share of the hinge's axis in
 posture home: a vertical hinge carries no weight.
 
-Stiffness of the servos: as much as a step h allows for the lightest joint of a leg, whose inertia about its axis, with
-the armature, is I. An undamped servo of stiffness k oscillates with omega^2 = k / I; on the mean over the legs
-(omega h)^2 is 1, so k = 1 / (h^2 mean(1 / I)). The damping is integrated implicitly, so it sets no limit.
+Stiffness of the servos: the greatest that a time step h allows for the lightest joint of a leg, whose inertia about its
+axis, armature included, is I. An undamped servo of stiffness k oscillates with omega^2 = k / I. On average over the
+legs (omega h)^2 is 1, so k = 1 / (h^2 mean(1 / I)). The damping is integrated implicitly, so it sets no limit.
 
-Both are rounded to the significant digits of the body's `servo`: 398728 and 1.5384e6 to 4.0e5 g mm^2/s^2 and
-1.5e6 g mm^2/s^2/rad for the stick insect (lever 40.645 mm; knees of 1.733, 1.327 and 1.615 g mm^2).
+Both gains are rounded to `Servo.digits`. For the stick insect, 398728 becomes 4.0e5 g mm^2/s^2 and 1.5384e6 becomes
+1.5e6 g mm^2/s^2/rad (lever 40.645 mm; inertias of the knees 1.733, 1.327 and 1.615 g mm^2).
 """
 
 import copy
@@ -32,23 +32,22 @@ from hexmj.errors import InputError
 from hexmj.legs import LEGS
 
 HOME_TOLERANCE = 1e-3
-"""Tolerance of the feet and the centre of mass in posture home, in lengths of the shortest leg."""
+"""Tolerance of the positions of feet and centre of mass in posture home, in lengths of the shortest leg."""
 
 
 def compile_body(
     conditions: Conditions, timestep: float | None = None, *, looks: bool = True, pushes: bool = False
 ) -> CompiledBody:
-    """Compile the body of some conditions; every call returns a model of its own.
+    """Return the body compiled for some conditions; every call returns a new model.
 
     Args:
-        conditions: give the body, its masses, the contact of the feet and the ground.
-        timestep: integration step [s], at most the longest one for which the body's gains and contacts are made,
-            which is the default.
-        looks: with the geoms that are only visual; without them it walks to the same bits, 2 % faster.
-        pushes: with sensors of the forces of the feet on the ground; without them it walks to the same bits, faster.
+        conditions: body, masses, contact of the feet, and ground.
+        timestep: physics step [s], at most `Body.longest_step`, which is the default.
+        looks: whether to keep geoms that are only visual; without them it walks 2 % faster, to the same bits.
+        pushes: whether to add sensors of the feet's forces; without them it walks faster, to the same bits.
 
     Raises:
-        InputError: the time step is out of range, or the body's MJCF is not as described.
+        InputError: the time step is out of range, or the MJCF does not fit the description of the body.
     """
     body = conditions.body
     timestep = body.longest_step if timestep is None else timestep
@@ -61,24 +60,24 @@ def compile_body(
 
 
 def plain_model(body: Body) -> mujoco.MjModel:
-    """Compile the MJCF of a body as it is; the model is shared and must not be changed.
+    """Return the model of a body's unchanged MJCF; it is cached and shared, so callers must not change it.
 
     Raises:
-        InputError: it does not compile, or is not as described.
+        InputError: the MJCF does not compile, or does not fit the description of the body.
     """
     return _plain_model(body, body.mjcf.read_bytes())
 
 
 def gravity(body: Body) -> float:
-    """Acceleration of gravity where a body walks [mm/s^2]."""
+    """Return the acceleration of gravity in a body's MJCF [mm/s^2], positive downwards."""
     return -float(plain_model(body).opt.gravity[2])
 
 
 def gains(model: mujoco.MjModel, body: Body) -> tuple[float, float]:
-    """Gains of a compiled body without load, the same for all joints.
+    """Return the gains of the servos of a compiled body without load; they are the same for all joints.
 
     Returns:
-        Torque limit [g mm^2/s^2], and stiffness, torque per angle off the target [g mm^2/s^2/rad].
+        The torque limit [g mm^2/s^2], and the stiffness: torque per distance from the target [g mm^2/s^2/rad].
     """
     data, joints, servo = posed(model, model.key(body.home).qpos), joint_numbers(model, body), body.servo
     feet = data.site_xpos[[model.site(foot).id for foot in body.feet]]
@@ -86,18 +85,18 @@ def gains(model: mujoco.MjModel, body: Body) -> tuple[float, float]:
     segments = np.linalg.norm(np.diff(places, axis=1), axis=-1)
     length = np.cumsum(segments[:, ::-1], axis=1)[:, ::-1]
     lever = (length * np.linalg.norm(data.xaxis[joints][..., :2], axis=-1)).max()
-    lightest = model.dof_M0[model.jnt_dofadr[joints]].min(axis=1)  # inertia, (leg,)
+    lightest = model.dof_M0[model.jnt_dofadr[joints]].min(axis=1)  # least inertia of its joints, (leg,)
     torque, stiffness = body.mass * -model.opt.gravity[2] * lever, 1.0 / (servo.step**2 * (1.0 / lightest).mean())
     return float(f"{torque:.{servo.digits - 1}e}"), float(f"{stiffness:.{servo.digits - 1}e}")
 
 
 def check_home(compiled: CompiledBody) -> None:
-    """Check the feet and the centre of mass of a body in posture home.
+    """Check the positions of the feet and of the centre of mass of a body in posture home.
 
-    The centre of mass must be at O, unless `Conditions.centre_of_mass` says how far ahead it is.
+    The centre of mass must be at O, unless `Conditions.centre_of_mass` moves it ahead or to the rear.
 
     Raises:
-        InputError: one of them is elsewhere.
+        InputError: a foot or the centre of mass is not at its expected position.
     """
     body, tolerance = compiled.body, HOME_TOLERANCE * compiled.body.lengths.shortest_leg
     tips = compiled.forward(compiled.home[compiled.columns.qpos].reshape(6, -1))
@@ -112,15 +111,15 @@ def check_home(compiled: CompiledBody) -> None:
     ahead, left, _ = _centre_of_mass(plain_model(body), body)
     where = f"body {body.name!r}: in posture {body.home!r} the centre of mass is"
     if compiled.conditions.centre_of_mass == 0.0 and abs(ahead) > tolerance:
-        remedy = f"Conditions(centre_of_mass={ahead:.4g}) to leave it there"
-        raise InputError(f"{where} {ahead:.4g} mm ahead of O; expected 0, or {remedy}")
+        remedy = f"use Conditions(centre_of_mass={ahead:.4g}) to leave it there"
+        raise InputError(f"{where} {ahead:.4g} mm ahead of O; expected 0. Or {remedy}.")
     if abs(left) > tolerance:
         raise InputError(f"{where} {left:.4g} mm left of O; expected 0")
 
 
 @lru_cache(maxsize=16)
 def _plain_model(body: Body, mjcf: bytes) -> mujoco.MjModel:
-    """See `plain_model`; `mjcf` holds the file's content, so that an edited file is compiled again."""
+    """Compile `plain_model`; `mjcf`, the content of the file, makes the cache compile an edited file again."""
     try:
         model = mujoco.MjModel.from_xml_path(str(body.mjcf))
     except ValueError as error:
@@ -131,7 +130,7 @@ def _plain_model(body: Body, mjcf: bytes) -> mujoco.MjModel:
 
 @lru_cache(maxsize=16)
 def _compiled(conditions: Conditions, looks: bool, pushes: bool, mjcf: bytes) -> CompiledBody:
-    """See `compile_body`."""
+    """Compile a body for `compile_body`; `mjcf`, the content of the file, is a part of the cache's key."""
     body = conditions.body
     plain, spec = _plain_model(body, mjcf), mujoco.MjSpec.from_file(str(body.mjcf))
     from_geoms = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
@@ -155,7 +154,7 @@ def _compiled(conditions: Conditions, looks: bool, pushes: bool, mjcf: bytes) ->
     model.pair_friction[:, :2] = conditions.friction
     feet = [model.site(foot).id for foot in body.feet]
     model.site_type[feet], radius = mujoco.mjtGeom.mjGEOM_SPHERE, model.geom(body.feet[0]).size[0]
-    model.site_size[feet, 0] = radius + radius / 10  # a touch sensor sees only contacts within its site
+    model.site_size[feet, 0] = radius + radius / 10  # a touch sensor counts only contacts within its site
     check(model, body, finished=True)
     if conditions.leg_mass != 1.0 or conditions.centre_of_mass != 0.0:
         _redistribute(model, conditions)
@@ -163,12 +162,12 @@ def _compiled(conditions: Conditions, looks: bool, pushes: bool, mjcf: bytes) ->
 
 
 def _add_missing(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body) -> None:
-    """Add servos and contact pairs that the MJCF lacks; only feet and trunk touch the ground.
+    """Add the servos and contact pairs that the MJCF lacks, set the gains, and remove all other contacts.
 
     Args:
-        spec: of the body's MJCF.
-        plain: the same MJCF, compiled.
-        body: its description.
+        spec: spec of the body's MJCF, which is changed.
+        plain: model of the unchanged MJCF.
+        body: description of the body.
     """
     if spec.option.integrator == mujoco.mjtIntegrator.mjINT_EULER:
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -192,7 +191,7 @@ def _add_missing(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body) -> None
 
 
 def _redistribute(model: mujoco.MjModel, conditions: Conditions) -> None:
-    """Give the legs their share of the mass, and move the trunk's masses to put the centre of mass in its place."""
+    """Scale the masses of legs and trunk to `leg_mass`, and shift those of the trunk to set `centre_of_mass`."""
     body = conditions.body
     legs = [model.body(part).id for leg in body.legs for part in leg.parts]
     trunk = [model.body(part).id for part in body.trunk]
@@ -200,7 +199,7 @@ def _redistribute(model: mujoco.MjModel, conditions: Conditions) -> None:
     if not in_legs * conditions.leg_mass < in_legs + in_trunk:
         most = 1.0 + in_trunk / in_legs
         raise InputError(
-            f"leg_mass = {conditions.leg_mass:g}; expected below {most:.4g}, the whole mass of body {body.name!r}"
+            f"leg_mass = {conditions.leg_mass:g}; expected below {most:.4g}: the trunk of {body.name!r} needs mass"
         )
     for parts, factor in (
         (legs, conditions.leg_mass),
@@ -212,13 +211,13 @@ def _redistribute(model: mujoco.MjModel, conditions: Conditions) -> None:
     mujoco.mj_setConst(model, data)
     offset = conditions.centre_of_mass - _centre_of_mass(model, body)[0]
     in_all = np.where(model.body_rootid == model.body(body.root).id, model.body_mass, 0.0).sum()
-    ahead = posed(model, model.qpos0).xmat[trunk, :3]  # the root's x in the frame of each part
+    ahead = posed(model, model.qpos0).xmat[trunk, :3]  # the root's forward axis in the frame of each part
     model.body_ipos[trunk] += offset * in_all / model.body_mass[trunk].sum() * ahead
     mujoco.mj_setConst(model, data)
 
 
 def _centre_of_mass(model: mujoco.MjModel, body: Body) -> np.ndarray:
-    """Centre of mass in posture home, in the root's frame (x ahead, y to the left, z up), (axis,) [mm]."""
+    """Return the centre of mass in posture home, in the root's frame (x forward, y left, z up), (axis,) [mm]."""
     data = posed(model, model.key(body.home).qpos)
     mujoco.mj_comPos(model, data)
     return data.subtree_com[model.body(body.root).id].copy()

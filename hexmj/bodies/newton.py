@@ -1,8 +1,8 @@
-"""Newton's method for a chain of hinges: joint angles that put the foot at a tip.
+"""Newton's method for a chain of hinges: joint angles that put the foot at a given tip.
 
-It starts from posture home, adds damping if a whole step does not bring the foot closer, and holds joints at their
-limits while the step would take them beyond. If it fails it starts again from a few other postures. With more than
-three hinges the angles then slide toward home with the foot at the tip, to the nearest posture [rad, Euclidean].
+The search starts from posture home. It adds damping if a whole step does not bring the foot closer, and holds a joint
+at its limit while a step would move the joint beyond. If the search fails, it restarts from other postures. With more
+than three hinges, the angles then move toward home with the foot at the tip, until their Euclidean distance is least.
 """
 
 import math
@@ -13,31 +13,31 @@ import numpy as np
 from hexmj.jitted import jitted, part
 
 CLOSE = 1e-10
-"""Greatest distance of a foot from its tip [mm]."""
+"""Maximum distance of a foot from the tip that it reaches [mm]."""
 
 FARTHEST = 0.5
-"""Greatest change of an angle in one step [rad]."""
+"""Maximum change of an angle in one step [rad]."""
 
 ATTEMPTS = 24
-"""Initial postures before a tip counts as out of reach."""
+"""Number of initial postures that are tried before a tip counts as out of reach."""
 
 PRIMES = (2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0)
-"""The multiples of their roots distribute these postures."""
+"""Primes; multiples of their square roots, modulo 1, distribute the initial postures evenly."""
 
 STEPS, MOST_DAMPING = 60, 1e6
-"""Greatest number of steps from one posture, accepted or not, and greatest damping."""
+"""Maximum number of steps from one initial posture, including rejected steps, and maximum damping."""
 
 SLIDES, STILL = 200, 1e-10
-"""Greatest number of steps toward home, and the size of the last one [rad]."""
+"""Maximum number of steps toward home, and the step size at which the search for the nearest posture ends [rad]."""
 
-NOTHING = (0.0, 0.0, 0.0)
+ZERO = (0.0, 0.0, 0.0)
 
 
 @jitted
 def reach(tips: Any, chains: Any) -> tuple[Any, Any]:
-    """Angles that reach tips, (n, leg, axis): (n, leg, joint), and whether there are any, (n, leg).
+    """Return angles that reach tips, (n, leg, axis): (n, leg, joint) [rad], and whether they are found, (n, leg).
 
-    `chains` are `kinematics.HingeChains`.
+    `chains` is a `kinematics.HingeChains`. Angles that are not found are NaN.
     """
     legs, hinges = chains.zero.shape
     joints, reachable = np.empty((len(tips), legs, hinges)), np.zeros((len(tips), legs), dtype=np.bool_)
@@ -55,9 +55,9 @@ def reach(tips: Any, chains: Any) -> tuple[Any, Any]:
 
 @part
 def _reached(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> bool:
-    """Whether a posture reaches a tip; it is written to `angles`.
+    """Search a posture that reaches the tip and write it to `angles`; return whether it is found.
 
-    The search starts from home, then from postures that fill the ranges evenly, as multiples of irrational numbers do.
+    The first search starts from home. Restarts are quasi-random: they fill the ranges of the joints evenly.
     """
     low, high = chains.low[leg], chains.high[leg]
     for attempt in range(ATTEMPTS):
@@ -73,15 +73,15 @@ def _reached(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> bool:
 
 @part
 def _newton(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
-    """Bring the foot as near to a tip as Newton's method can; return its distance [mm]."""
+    """Change `angles` until the foot is as near to the tip as Newton's method gets; return the distance left [mm]."""
     low, high = chains.low[leg], chains.high[leg]
     damping, step, trial = 0.0, np.empty_like(angles), np.empty_like(angles)
-    distance = _look(angles, tip, leg, chains, lever)
+    distance = _jacobian(angles, tip, leg, chains, lever)
     for _ in range(STEPS):
         shorter = min(1.0, FARTHEST / max(_step(step, angles, angles, low, high, lever, damping), FARTHEST))
         for j in range(len(angles)):
             trial[j] = min(max(angles[j] + shorter * step[j], low[j]), high[j])
-        closer = _look(trial, tip, leg, chains, lever)
+        closer = _jacobian(trial, tip, leg, chains, lever)
         if closer < distance:
             angles[:], distance = trial, closer
             damping = 0.0 if damping < 1e-5 else damping / 10.0
@@ -89,17 +89,17 @@ def _newton(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
             break
         else:
             damping = max(1e-3, 10.0 * damping)
-            _look(angles, tip, leg, chains, lever)
+            _jacobian(angles, tip, leg, chains, lever)
     return distance
 
 
 @part
 def _slide_home(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> None:
-    """Reduce the distance from home among the postures that reach a tip."""
+    """Move `angles` toward home while the foot stays at the tip."""
     low, high, home = chains.low[leg], chains.high[leg], chains.home[leg]
     share, step = 1.0, np.empty_like(angles)
     for _ in range(SLIDES):
-        _look(angles, tip, leg, chains, lever)
+        _jacobian(angles, tip, leg, chains, lever)
         if not share * _step(step, angles, home, low, high, lever, 0.0) > STILL:
             return
         trial = np.minimum(np.maximum(angles + share * step, low), high)
@@ -112,15 +112,15 @@ def _slide_home(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> Non
 
 @part
 def _step(step: Any, angles: Any, toward: Any, low: Any, high: Any, lever: Any, damping: float) -> float:
-    """Step that brings the foot to the tip, to first order, and is nearest to the step d toward other angles.
+    """Write to `step` the change of the angles that brings the foot to the tip; return its largest component [rad].
 
-    It is d + J^T (J J^T + damping)^-1 (error - J d). Joints that it would take beyond a limit are held, one after the
-    other. Damping is a share of the trace of J J^T. Returns the greatest change of an angle.
+    To first order it is the solution nearest to d = toward - angles: d + J^T (J J^T + damping)^-1 (error - J d).
+    Joints that it would move beyond a limit are held instead. `damping` is a share of the trace of J J^T.
     """
     hinges, held, again, largest = len(angles), 0, True, 0.0
     while again:
         again, largest = False, 0.0
-        x, y, z, missing = NOTHING, NOTHING, NOTHING, _plus(NOTHING, 1.0, lever[hinges])
+        x, y, z, missing = ZERO, ZERO, ZERO, _plus(ZERO, 1.0, lever[hinges])
         for j in range(hinges):
             if not held >> j & 1:
                 column = lever[j]
@@ -140,23 +140,24 @@ def _step(step: Any, angles: Any, toward: Any, low: Any, high: Any, lever: Any, 
 
 @part
 def _solved(x: Any, y: Any, z: Any, damping: float, right: Any) -> tuple[float, float, float]:
-    """Solve by Cramer's rule for a symmetric matrix of these rows, with damping; 0 if it is singular."""
+    """Solve a damped linear system by Cramer's rule; its symmetric matrix has rows x, y, z. Return 0 if singular."""
     trace = x[0] + y[1] + z[2]
     extra = damping * trace
     x, y, z = (x[0] + extra, x[1], x[2]), (y[0], y[1] + extra, y[2]), (z[0], z[1], z[2] + extra)
     a, b, c = _cross(y, z), _cross(z, x), _cross(x, y)
     determinant = _dot(x, a)
     if not determinant > 1e-30 * trace**3:
-        return NOTHING
+        return ZERO
     return _dot(right, a) / determinant, _dot(right, b) / determinant, _dot(right, c) / determinant
 
 
 @part
-def _look(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
-    """Turn the hinges from the foot to the body; write the columns of J, (joint, axis), and the error of the foot to
-    `lever`, and return the error's length [mm]."""
+def _jacobian(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
+    """Write the columns of the Jacobian J, (joint, axis), and then the error of the foot, (axis,), to `lever`.
+
+    Return the length of the error [mm]."""
     hinges = len(angles)
-    foot = _plus(NOTHING, 1.0, chains.foot[leg])
+    foot = _plus(ZERO, 1.0, chains.foot[leg])
     for j in range(hinges - 1, -1, -1):
         axis, anchor, turn = chains.axis[leg, j], chains.anchor[leg, j], angles[j] - chains.zero[leg, j]
         cosine, sine = math.cos(turn), math.sin(turn)
@@ -166,13 +167,13 @@ def _look(angles: Any, tip: Any, leg: int, chains: Any, lever: Any) -> float:
         _write(lever, j, _cross(axis, off))
         foot = _plus(off, 1.0, anchor)
     error = _plus(foot, -1.0, tip)
-    _write(lever, hinges, _plus(NOTHING, -1.0, error))
+    _write(lever, hinges, _plus(ZERO, -1.0, error))
     return math.sqrt(_dot(error, error))
 
 
 @part
 def _turned(vector: Any, axis: Any, cosine: float, sine: float) -> tuple[float, float, float]:
-    """Turn a vector about an axis."""
+    """Return a vector turned about a unit vector, by the cosine and sine of the angle."""
     x, y, z = _cross(axis, vector)
     along = (1.0 - cosine) * _dot(axis, vector)
     return (

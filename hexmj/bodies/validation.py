@@ -1,4 +1,4 @@
-"""Checks of a body's MJCF: that it is as described, and that the finished model has no forces that hexmj ignores."""
+"""Checks that a body's MJCF fits its description, and that the finished model has no forces that hexmj ignores."""
 
 from collections.abc import Iterator
 from math import inf
@@ -13,17 +13,17 @@ from hexmj.body import ROOT_QVEL, Body
 from hexmj.errors import InputError
 
 LEG_TOLERANCE = 1.5
-"""Factor by which the shortest leg may differ from `Lengths.shortest_leg`."""
+"""Maximum factor between `Lengths.shortest_leg` and the shortest leg of the MJCF."""
 
 LEAST_GRAVITY = 100.0
-"""A sixteenth of the moon's [mm/s^2]; a smaller one is in metres."""
+"""Minimum gravity, a sixteenth of the moon's [mm/s^2]; a smaller value is taken for one in m/s^2."""
 
 MASS_TOLERANCE = 1e-3
-"""Share by which the model's mass may differ from the description's."""
+"""Maximum relative difference between the mass of the model and `Body.mass`."""
 
 SOFTEST = 4.0
-"""Greatest time constant of a contact, in longest steps; MuJoCo takes at least two steps, and fine steps take two of
-their own."""
+"""Maximum time constant of a contact, in multiples of `Body.longest_step`. MuJoCo's minimum is two physics steps; in a
+fine step (`physics.substeps`) hexmj sets it to two of the shorter steps."""
 
 ALL, ROOT, LEGS, ABOVE_0 = slice(None), slice(ROOT_QVEL), slice(ROOT_QVEL, None), float_info.min
 
@@ -48,20 +48,20 @@ RULES = (
     ("margin of a contact pair", "pair_margin", ALL, 0, 0),
     ("gap of a contact pair", "pair_gap", ALL, 0, 0),
 )
-"""Name in the MJCF, field of the finished model, elements that are checked, least and greatest value.
+"""Checks of the finished model: name in the MJCF, field of the model, elements that are checked, minimum and maximum.
 
-Outside of these ranges a walk depends on forces that no measure includes, or the contacts are less accurate than those
-with which results were measured."""
+Outside of these ranges a walk depends on forces that hexmj does not measure, or its contacts are less accurate than in
+hexmj's results."""
 
 HARMLESS = ("equality", "filterparent", "midphase", "nativeccd", "multiccd", "island", "energy", "fwdinv", "eulerdamp")
-"""Flags that have no effect on the walk."""
+"""MuJoCo's flags that have no effect on a walk."""
 
 
 def check(model: mujoco.MjModel, body: Body, *, finished: bool = False) -> None:
-    """Check an MJCF, compiled as it is, or the finished model that walks.
+    """Check the model of an unchanged MJCF or, with `finished`, the model that walks.
 
     Raises:
-        InputError: the MJCF does not fit its description, or the finished model has forces that hexmj ignores.
+        InputError: the MJCF does not fit the description of the body, or the model has forces that hexmj ignores.
     """
     for faults in (_finished,) if finished else (_names, _joints, _sizes, _legs, _ground_and_pairs):
         for fault in faults(model, body):
@@ -109,7 +109,7 @@ def _legs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
         chain, part = [], model.body(foot.bodyid[0])
         while part.id not in (0, root):
             if model.body_mass[part.id] > 0 and part.name not in (*leg.parts, *body.trunk):
-                yield f"body {part.name!r} between the root and {leg.foot!r} must be one of the leg's parts"
+                yield f"body {part.name!r}, between the root and {leg.foot!r}, must be one of the leg's parts"
             chain = [model.joint(part.jntadr[0] + i).name for i in range(part.jntnum[0])] + chain
             part = model.body(part.parentid[0])
         if part.id != root or tuple(chain) != leg.joints:
@@ -132,25 +132,25 @@ def _ground_and_pairs(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     for pair in zip(model.pair_geom1, model.pair_geom2, strict=True):
         if frozenset(pair) not in expected:
             names = " and ".join(repr(model.geom(geom).name) for geom in pair)
-            yield f"contact pair {names}; expected each foot and part of the trunk with {body.ground!r}, each once"
+            yield f"contact pair {names}; expected only {body.ground!r} with each foot and part of the trunk, once"
         expected -= {frozenset(pair)}
     outside = model.body_rootid[model.geom_bodyid] != model.body(body.root).id
     outside[ground.id] = False
     for geom in np.flatnonzero(outside & (model.geom_contype | model.geom_conaffinity != 0)):
-        yield f"geom {model.geom(geom).name!r} would touch nothing; obstacles are set by Conditions(ground=...)"
+        yield f"geom {model.geom(geom).name!r} would have no contacts; set obstacles by Conditions(ground=...)"
 
 
 def _sizes(model: mujoco.MjModel, body: Body) -> Iterator[str]:
     gravity = model.opt.gravity
     if gravity[:2].any() or not -gravity[2] >= LEAST_GRAVITY:
-        yield f"gravity = {gravity.tolist()} mm/s^2; expected it to point down, as (0, 0, -9810)"
+        yield f"gravity = {gravity.tolist()} mm/s^2; expected a vector that points down, as (0, 0, -9810)"
     mass = model.body_subtreemass[model.body(body.root).id]
     if not abs(mass - body.mass) <= MASS_TOLERANCE * body.mass:
-        yield f"mass = {body.mass:g} g; the MJCF's is {mass:.6g} g"
+        yield f"mass = {body.mass:g} g; expected the mass of the MJCF, {mass:.6g} g"
     described, found = body.lengths.shortest_leg, hinge_chains(model, body).length.min()
     if not 1 / LEG_TOLERANCE <= described / found <= LEG_TOLERANCE:
         factor = found / described
-        yield f"shortest_leg = {described:g} mm; the MJCF's is {found:.4g} mm, try lengths.scaled({factor:.3g})"
+        yield f"shortest_leg = {described:g} mm; it is {found:.4g} mm in the MJCF. Use lengths.scaled({factor:.3g})"
 
 
 def _finished(model: mujoco.MjModel, body: Body) -> Iterator[str]:
@@ -158,7 +158,7 @@ def _finished(model: mujoco.MjModel, body: Body) -> Iterator[str]:
         for name, kind in kinds.__members__.items():
             flag = name.lower().partition("_")[2]  # empty for the number of flags
             if flag and flag not in HARMLESS and flags & kind.value:
-                yield f"flag {flag!r} is not MuJoCo's default"
+                yield f"flag {flag!r} differs from MuJoCo's default"
     softest = SOFTEST * body.longest_step
     contacts = ("time constant of a contact pair [s]", "pair_solref", np.s_[:, 0], ABOVE_0, softest)
     for name, field, rows, least, greatest in (*RULES, contacts):
