@@ -1,7 +1,7 @@
-"""MuJoCo's batch: many bodies side by side on a pool of threads. The only module that steps MuJoCo in bulk.
+"""MuJoCo's batch: many bodies side by side on a pool of threads. No other module steps MuJoCo in bulk.
 
-Another engine is another module with an `Engine` in it. While a batch steps, MuJoCo's warnings are not logged and its
-clock is stopped: without the clock bodies walk 5 % faster (measured), to the same bits.
+Any class that implements `Engine` can replace it. While a batch steps, MuJoCo's warnings are not logged and its clock
+is stopped: without the clock bodies walk 5 % faster (measured), to the same bits.
 """
 
 from collections.abc import Iterator
@@ -22,86 +22,86 @@ from hexmj.rotations import lowest
 from hexmj.threads import check_memory, thread_count
 
 STATE = ("qpos", "qvel", "qacc_warmstart")
-"""Arrays that determine how a body goes on."""
+"""MuJoCo's arrays that make up the state of a body: they determine its further motion."""
 
 STATE_BITS = int(mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL | mujoco.mjtState.mjSTATE_WARMSTART)
-"""The same as a set of MuJoCo's state elements, which it records in one array."""
+"""MuJoCo's flags for the arrays in `STATE`, which make it record them as one array."""
 
 MEMORY = 120_000
-"""Memory of a body while it walks, as measured for the stick insect [bytes]."""
+"""Memory per body while it walks, measured for the stick insect [bytes]."""
 
 CLEAR = 0.01
-"""Height of a trunk above flat ground from which it cannot touch it, in standing heights."""
+"""Height of the trunk above flat ground, in standing heights, above which contacts are not computed."""
 
 INTERRUPTIBLE = 20_000
-"""Steps of one body between two chances for Ctrl-C while bodies settle; a fifth of a second."""
+"""Maximum number of steps, summed over bodies, between two chances for Ctrl-C during settling; they take 0.2 s."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rolled:
-    """Record of some bodies over physics steps."""
+    """Record of n bodies over physics steps."""
 
     before: np.ndarray
-    """(n, state) before the first step; `Engine.put` takes it."""
+    """(n, state) states before the first step, as `Engine.put` takes them."""
     feet: np.ndarray
-    """(n, 1 + step, leg, 3) before the first and after each step, in the world [mm]."""
+    """(n, 1 + step, leg, 3) feet in the world before the first step and after each step [mm]."""
     sensors: np.ndarray
-    """(n, step, column) at the beginning of each step."""
+    """(n, step, column) `sensordata` at the beginning of each step."""
     force: np.ndarray
-    """(n, step, actuator) at the beginning of each step [g mm^2/s^2]."""
+    """(n, step, actuator) forces of the actuators at the beginning of each step [g mm^2/s^2]."""
     torque: np.ndarray
-    """(n, step, joint) as it acts over each step, in which the speed changes and with it the damping [g mm^2/s^2]."""
+    """(n, step, joint) torques that act over each step, with the damping of the speed at its end [g mm^2/s^2]."""
     after: np.ndarray
-    """(n, step, state) after each step; `Engine.put` takes it."""
+    """(n, step, state) states after each step, as `Engine.put` takes them."""
 
 
 class Engine(Protocol):
-    """Independent bodies that step side by side."""
+    """Interface of an engine, which steps independent bodies side by side."""
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
-        """Set the states of some bodies, (n, state)."""
+        """Set the states, (n, state), of the bodies with the indices `ids`, (n,)."""
         ...
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
-        """Step some bodies with these controls, (n, step, actuator).
+        """Step the bodies `ids`, (n,), with some controls, (n, step, actuator), and return their record.
 
-        With `parts` above 1 each row of the controls is a part of a step, and the time constant of the contacts is two
-        parts, the hardest possible.
+        With `parts` above 1 a physics step is divided: each row of the controls is for one part. Contacts are then as
+        hard as possible, with a time constant of two parts.
 
         Raises:
-            Diverged: the state of a body is no longer finite, or MuJoCo warns of it.
+            Diverged: the state of a body is not finite, or MuJoCo warns that a body diverges.
         """
         ...
 
 
 class Diverged(Exception):
-    """One body that diverged; `walk_error` makes the user's error of it."""
+    """Raised if a body diverged; `walk_error` converts it into the user's error."""
 
     def __init__(self, start: int, kinds: str, state: dict[str, np.ndarray], substep: int = 0) -> None:
-        """`start` is its index, `kinds` names what happened, `state` is the last finite one."""
+        """`start` is the body's index, `kinds` describes the failure, `state` is the last finite state."""
         super().__init__(start, kinds)
         self.start, self.kinds, self.state, self.substep = start, kinds, state, substep
 
 
 def walk_error(error: Diverged, doing: str, time: float) -> SimulationError:
-    """The error of a body that diverged while it was `doing` something, at a time [time units]."""
+    """Return the user's error for a body that diverged while `doing`, such as "settling", at a time [time units]."""
     message = f"start {error.start} diverged while {doing}, at {time:.4g} time units: {error.kinds}"
     return SimulationError(message, error.state)
 
 
 class MujocoBatch:
-    """An `Engine`: MuJoCo's batch of one compiled body."""
+    """An `Engine` that steps many copies of one compiled body in MuJoCo's batch."""
 
     qpos: np.ndarray
-    """(start, position), current."""
+    """(start, position) current positions."""
     qvel: np.ndarray
-    """(start, velocity), current."""
+    """(start, velocity) current velocities."""
     push: np.ndarray
-    """(start,) force on the root to the left [g mm/s^2], 0 unless the caller sets it."""
+    """(start,) force on the root to the left [g mm/s^2]; 0 unless the caller sets it."""
 
     def __init__(self, compiled: CompiledBody, count: int, threads: int | None) -> None:
-        """Make `count` bodies, stepped by `threads`, one per core unless given."""
-        check_memory(f"{count} starts that walk at once in physics", MEMORY * count)
+        """Create `count` bodies, which `threads` threads step, by default one per core."""
+        check_memory(f"{count} starts in one physical walk", MEMORY * count)
         self._model, self._root = compiled.model, compiled.root
         model = compiled.model
         self._batch = Batch(model, count, thread_count(threads))
@@ -119,29 +119,29 @@ class MujocoBatch:
         self._joints = speeds, servos.start, -model.actuator_biasprm[servos, 2], compiled.torque_limits
 
     def reset(self) -> None:
-        """Put all bodies into their initial state, those that diverged too."""
+        """Put all bodies into their initial state, including bodies that diverged."""
         self._batch.warning[:] = 0
         with stepping():
             self._batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
 
     def states(self, ids: np.ndarray) -> np.ndarray:
-        """The states of some bodies, (n, state); `put` takes them."""
+        """Return the states of the bodies `ids`, (n, state), as `put` takes them."""
         return np.concatenate([values[ids] for values in self._state], axis=1)
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
-        """See `Engine.put`."""
+        """Set the states of bodies, see `Engine.put`."""
         for values, current in zip(np.split(states, self._ends, axis=1), self._state, strict=True):
             current[ids] = values
 
     @property
     def rotation(self) -> np.ndarray:
-        """From the root frames to the world, (start, axis, axis), if positions are up to date."""
+        """Rotation matrices from root frames to the world, (start, axis, axis), as of the last update of positions."""
         return self._batch.bind("xmat")[:, self._root].reshape(-1, 3, 3)
 
     def stand(self, ids: np.ndarray, states: np.ndarray, control: np.ndarray) -> None:
-        """Put some bodies into states of rest, (n, state), and update their positions.
+        """Put the bodies `ids` into states of rest, (n, state), and update their positions.
 
-        Controls, (n, actuator), are those of the steps to come, so this engine does not need them.
+        `control`, (n, actuator), is for engines that need the joint targets in advance; this engine does not.
         """
         self._batch.warning[ids] = 0
         self.put(ids, states)
@@ -149,7 +149,7 @@ class MujocoBatch:
             self._update(ids)
 
     def rest(self, control: np.ndarray, steps: int) -> None:
-        """Step all bodies with one control, (start, actuator), and update everything that they show.
+        """Step all bodies with constant controls, (start, actuator), and update their sensors and forces.
 
         Raises:
             Diverged: see `Engine.roll`.
@@ -158,14 +158,14 @@ class MujocoBatch:
         before = self.states(ids)
         self._batch.bind("ctrl")[:] = control
         with stepping():
-            while steps > (some := max(1, INTERRUPTIBLE // len(ids))):
-                self._batch.step(nstep=some)
-                steps -= some
+            while steps > (at_once := max(1, INTERRUPTIBLE // len(ids))):
+                self._batch.step(nstep=at_once)
+                steps -= at_once
             self._batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_ACC)
         self._check(ids, before)
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
-        """See `Engine.roll`."""
+        """Step bodies and return their record, see `Engine.roll`."""
         model, before = self._model, self.states(ids)
         if parts > 1:
             timestep = model.opt.timestep / parts
@@ -175,7 +175,7 @@ class MujocoBatch:
             with stepping():
                 seen = self._batch.rollout(control.shape[1], control, record=record, ids=ids)
                 self._check(ids, before)
-                self._update(ids)  # for the feet at the end
+                self._update(ids)  # positions of the feet after the last step
         finally:
             if parts > 1:
                 self._timestep[ids], self._contact[ids] = model.opt.timestep, model.pair_solref
@@ -185,21 +185,21 @@ class MujocoBatch:
         return Rolled(before, places, seen["sensordata"], seen["actuator_force"], torque, seen[STATE_BITS])
 
     def named(self, state: np.ndarray) -> dict[str, np.ndarray]:
-        """The parts of a body's state, (state,), by the names in `STATE`."""
+        """Return the arrays of one body's state, (state,), by the names in `STATE`."""
         return dict(zip(STATE, np.split(state, self._ends), strict=True))
 
     def _update(self, ids: np.ndarray) -> None:
-        """Update positions, and contacts of trunks that may touch the ground: contacts take two fifths of the time."""
-        usual = self._model.opt.disableflags
+        """Update positions, but contacts only of trunks near the ground: contacts take two fifths of the time."""
+        flags = self._model.opt.disableflags
         above = ids[_lowest(ids, self.qpos, *self._corners) > self._clear]
-        self._disabled[above] = usual | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
+        self._disabled[above] = flags | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
         try:
             self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
         finally:
-            self._disabled[above] = usual
+            self._disabled[above] = flags
 
     def _check(self, ids: np.ndarray, before: np.ndarray) -> None:
-        """Raise `Diverged` for the first body that did, with its state before, of (n, state)."""
+        """Raise `Diverged` for the first body that diverged; `before`, (n, state), holds the last finite states."""
         warned = self._batch.warning
         i = _first_broken(ids, warned, self.qpos)
         if i < len(ids):
@@ -212,7 +212,7 @@ def _stopped_clock() -> float:
     return 0.0
 
 
-_lock, _users = Lock(), []  # the user's clock and warning callbacks, once for each thread that steps
+_lock, _users = Lock(), []  # the user's callbacks (clock, warning), once for each thread that steps
 
 
 @contextmanager
@@ -235,18 +235,18 @@ def stepping() -> Iterator[None]:
 
 @jitted
 def _acting(before: Any, after: Any, force: Any, speeds: int, servos: int, damping: Any, limits: Any) -> Any:
-    """Torques of the joints over each step, (n, step, joint), from the forces at its beginning and the states.
+    """Return the torques that act on the joints over each step, (n, step, joint).
 
-    The damping of a servo is integrated implicitly, except at the limit of its torque.
+    MuJoCo integrates the damping of a servo implicitly (with the speed after the step), except at the torque limit.
 
     Args:
         before: states before the first step, (n, state).
         after: states after each step, (n, step, state).
-        force: of the actuators at the beginning of each step, (n, step, actuator).
-        speeds: first column of the states that holds a joint's speed.
-        servos: first column of the forces that holds a joint's servo.
-        damping: of each servo, (joint,).
-        limits: of each servo, (joint,).
+        force: forces of the actuators at the beginning of each step, (n, step, actuator).
+        speeds: column of the states with the speed of the first joint.
+        servos: column of the forces with the servo of the first joint.
+        damping: damping of each servo, (joint,).
+        limits: torque limit of each servo, (joint,).
     """
     torque = np.empty((force.shape[0], force.shape[1], len(damping)))
     for n in range(torque.shape[0]):
@@ -261,7 +261,7 @@ def _acting(before: Any, after: Any, force: Any, speeds: int, servos: int, dampi
 
 @jitted
 def _lowest(ids: Any, qpos: Any, corners: Any, radii: Any) -> Any:
-    """Heights of the lowest points of some trunks, (n,) [mm], from `CompiledBody.trunk_corners`."""
+    """Return the height of the lowest point of each trunk, (n,) [mm], from `CompiledBody.trunk_corners`."""
     heights = np.empty(len(ids))
     for i, n in enumerate(ids):
         heights[i] = lowest(qpos[n], corners, radii)
@@ -270,8 +270,8 @@ def _lowest(ids: Any, qpos: Any, corners: Any, radii: Any) -> Any:
 
 @jitted
 def _first_broken(ids: Any, warned: Any, qpos: Any) -> int:
-    """Index of the first body with a warning, (start, kind, [last, count]), or a state that is not finite; `len(ids)`
-    if there is none."""
+    """Return the index in `ids` of the first body with a warning, (start, kind, [last, count]), or with positions that
+    are not finite; `len(ids)` if there is none."""
     for i, n in enumerate(ids):
         for kind in range(warned.shape[1]):
             if warned[n, kind, 1] > 0:

@@ -1,12 +1,12 @@
 """From the plan to joint targets: tips in time and space, then inverse kinematics, chunk by chunk.
 
-The plan says where a tip is and whether it swings. Unless it names a height, a foot is raised in
-`Conditions.lift_time` when its leg begins to protract, and lowered over the last `Conditions.landing_time` before the
-plan's AEP, so that it meets the ground where the plan lets it stand. A swing that ends elsewhere is lowered from then
-on. These are times of the physical world: both transitions vanish against the stride as V_p goes to zero.
+The plan says where a tip is, whether it swings, and possibly how high it is. If the plan gives no height, the foot is
+raised within `Conditions.lift_time` after lift-off. It is lowered over the last `Conditions.landing_time` before the
+plan's AEP, so that touchdown is where the plan begins the stance. If the swing ends elsewhere, lowering begins then.
+Both times are in ms of the physical world, so they become a vanishing part of the stride as V_p goes to zero.
 
-The ground comes half a millimetre early, since the body sags, so a foot is slow over the last millimetre already.
-`substeps` takes care of feet that are not.
+Since the body sags, a foot meets the ground half a millimetre early. So a foot moves slowly over its last millimetre.
+Fine steps (`substeps`) treat feet that strike the ground faster.
 """
 
 from dataclasses import dataclass, replace
@@ -24,20 +24,20 @@ from hexmj.timing import Stride, steps_within
 from hexmj.walks import PlannedWalk, part_of
 
 EVENLY = 0.25
-"""Share of the height that is raised and lowered evenly; it determines how fast a foot meets the ground."""
+"""Share of the step height that is linear in the phase of the lift; it determines the speed at touchdown."""
 
 CHUNK = 40
-"""Approximate physics steps in a chunk: fewer cost more calls, more waste steps after a fall (0.4 to 0.8 %)."""
+"""Approximate number of physics steps in a chunk. Short chunks cost calls, long chunks waste steps after a fall."""
 
 AHEAD = 8
-"""Chunks that are planned at once for a single start, since a call of its plan for each takes a twelfth of the time."""
+"""Number of chunks planned at once for a single start; planning each chunk by its own call costs 8 % of the time."""
 
 
 class TipTargets:
-    """The targets of many starts, made while the plan goes on."""
+    """Targets of the tips of many starts, computed from successive steps of a plan."""
 
     def __init__(self, starts: np.ndarray, conditions: Conditions, stride: Stride) -> None:
-        """All feet stand at the starts, (start, leg) [mm]."""
+        """Begin with all feet standing at the starts, (start, leg) [mm]."""
         self._x = np.array(starts, order="C")
         self._y = np.tile(stride.geometry.y, (len(starts), 1))
         self._stance = np.ones(starts.shape, dtype=bool)
@@ -49,16 +49,16 @@ class TipTargets:
         self._origin = np.array(stride.geometry.origin)
 
     def follow(self, plan: PlannedWalk, ids: np.ndarray) -> np.ndarray:
-        """Tips of some starts, (n,), at the end of each substep of the plan's next steps.
+        """Return the targets of the starts `ids`, (n,), at the end of each substep of the plan's next steps.
 
         Returns:
-            Tips in the root frame, (n, substep, leg, 3) forward, left and up [mm].
+            Tips in the root frame, (n, substep, leg, 3): forward, left and up [mm].
         """
         tips = np.empty((len(ids), len(plan.time) * self._substeps, 6, 3))
-        planned = plan.x, plan.y, plan.stance, plan.aep, plan.height
-        wanted = tuple(map(np.ascontiguousarray, planned))  # one memory layout, so that numba compiles once
+        arrays = plan.x, plan.y, plan.stance, plan.aep, plan.height
+        planned = tuple(map(np.ascontiguousarray, arrays))  # one memory layout, so that numba compiles once
         last = self._x, self._y, self._stance, self._lift, self._height
-        _follow(wanted, ids, last, self._substeps, self._rates, self._heights, self._origin, tips)
+        _follow(planned, ids, last, self._substeps, self._rates, self._heights, self._origin, tips)
         for values, old in ((plan.x, self._x), (plan.y, self._y), (plan.stance, self._stance)):
             old[ids] = values[-1, ids]
         return tips
@@ -66,60 +66,60 @@ class TipTargets:
 
 @dataclass(frozen=True, eq=False)
 class Orders:
-    """Joint targets of some starts for the next chunk."""
+    """Joint targets of n starts for the next chunk."""
 
     plan: PlannedWalk
-    """The plan over the chunk, of all starts."""
+    """Plan of all starts over the chunk."""
     first: int
-    """Index of the first substep."""
+    """Index of the chunk's first substep, counted from the beginning of the walk."""
     ids: np.ndarray
-    """(n,) indices of these starts."""
+    """(n,) indices of the starts that carry out these orders."""
     control: np.ndarray
-    """(n, substep, actuator) joint targets [rad], and the adhesion of feet with `Conditions.grasp`."""
+    """(n, substep, actuator) joint targets [rad], followed by the adhesion of the feet if `Conditions.grasp` is set."""
     tips: np.ndarray
-    """(n, substep, leg, 3) targets of the tips before each of these substeps, in the root frame [mm]."""
+    """(n, substep, leg, 3) targets of the tips before each substep of `control`, in the root frame [mm]."""
     missed: np.ndarray
-    """(n, substep, leg) whether a tip is out of reach."""
+    """(n, substep, leg) whether the target of a tip is out of reach."""
 
     def only(self, keep: np.ndarray) -> "Orders":
-        """The orders of some of the starts, (n,)."""
+        """Return the orders of the starts for which `keep`, (n,), is True."""
         few = {name: getattr(self, name)[keep] for name in ("ids", "control", "tips", "missed")}
         return replace(self, **few)
 
 
 class OrdersFromPlan:
-    """The orders of settled starts, made while their plan goes on."""
+    """Computes the orders of settled starts, chunk by chunk, while their plan advances."""
 
     tips: np.ndarray
     """(start, leg, 3) current targets of the tips, in the root frame [mm]."""
     steps: int
-    """Steps of the whole walk."""
+    """Number of steps of the plan in the whole walk."""
 
-    def __init__(self, settled: Settled, plan: Plan, duration: float, multiple: int = 0) -> None:
-        """All feet stand, at time 0 of a plan that ends after a duration [time units].
+    def __init__(self, settled: Settled, plan: Plan, duration: float, divisor: int = 0) -> None:
+        """Begin with all feet standing, at time 0 of a plan that ends after a duration [time units].
 
-        The steps of a chunk divide `multiple`, see `Push.divisor`.
+        The number of plan steps in a chunk divides `divisor`, see `Push.divisor`.
 
         Raises:
-            InputError: the plan has other starts or another stride, is not at time 0, or is for other conditions.
+            InputError: the plan has other starts or another stride, is not at time 0, or is made for other conditions.
         """
         check_plan(plan, settled.starts, settled.stride)
         check_made_for(plan, settled.conditions)
         self._plan, self._settled, self._substeps = plan, settled, settled.substeps
         self.steps, self._done = int(steps_within(duration, settled.stride)), 0
-        self._chunk, self._planned = steps_in_chunk(self._substeps, multiple), list[PlannedWalk]()
+        self._chunk, self._planned = steps_in_chunk(self._substeps, divisor), list[PlannedWalk]()
         self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
         self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
         self.tips = settled.tips.copy()
 
     def steps_ahead(self) -> int:
-        """Steps of the plan in the next chunk, 0 at the end of the walk."""
+        """Return the number of plan steps in the next chunk; 0 at the end of the walk."""
         return min(self._chunk, self.steps - self._done)
 
     def ahead(self, ids: np.ndarray, steps: int | None = None) -> Orders | None:
-        """The orders of some starts, (n,), for the next steps, by default a chunk; None at the end of the walk.
+        """Return the orders of the starts `ids`, (n,), for the next steps, by default a chunk; None after the last.
 
-        A leg whose tip is out of reach keeps its last angles.
+        A leg with a target out of reach keeps its last joint angles.
         """
         first, m = self._done * self._substeps, self._substeps
         if self._done == self.steps:
@@ -136,7 +136,7 @@ class OrdersFromPlan:
         control = joints.reshape(*joints.shape[:2], -1)
         if self._settled.conditions.grasp:
             control = np.concatenate([control, plan.stance[:, ids].swapaxes(0, 1).repeat(m, axis=1)], axis=2)
-        if self._done == self.steps:  # one more substep shows the state at the end
+        if self._done == self.steps:  # one more substep records the state at the end
             control = np.concatenate([control, control[:, -1:]], axis=1)
         return Orders(plan, first, ids, control, tips[:, : control.shape[1]], ~reachable)
 
@@ -150,17 +150,17 @@ class OrdersFromPlan:
         return self._planned.pop()
 
 
-def steps_in_chunk(substeps: int, multiple: int = 0) -> int:
-    """Steps of a plan in a chunk, with `substeps` physics steps each; `multiple` is a multiple of them."""
+def steps_in_chunk(substeps: int, divisor: int = 0) -> int:
+    """Return the number of plan steps in a chunk, with `substeps` physics steps each; it divides `divisor`."""
     most = max(1, CHUNK // substeps)
-    return next(steps for steps in range(most, 0, -1) if multiple % steps == 0)
+    return next(steps for steps in range(most, 0, -1) if divisor % steps == 0)
 
 
 def check_made_for(plan: Plan, conditions: Conditions) -> None:
-    """Check a plan that lifts the feet itself and has an attribute `made_for`, the conditions for which it does.
+    """Check the conditions that a plan names in its attribute `made_for`, if it has one because it lifts the feet.
 
     Raises:
-        InputError: V_p, the path of the feet or the body is another one.
+        InputError: V_p, the path of the feet or the body differs between `made_for` and `conditions`.
     """
     made_for = getattr(plan, "made_for", None)
     if isinstance(made_for, Conditions):
@@ -171,7 +171,7 @@ def check_made_for(plan: Plan, conditions: Conditions) -> None:
 
 
 def hold(joints: np.ndarray, last: np.ndarray) -> None:
-    """Replace missing angles, (substep, leg, joint), by those before them, at first by `last`."""
+    """Replace NaN in `joints`, (substep, leg, joint), by the angles one substep before; `last` is before the first."""
     for angles in joints:
         missing = np.isnan(angles)
         angles[missing] = last[missing]
@@ -179,12 +179,12 @@ def hold(joints: np.ndarray, last: np.ndarray) -> None:
 
 
 @jitted
-def _follow(wanted: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any, origin: Any, tips: Any) -> None:
-    """Move tips evenly between two steps; without a planned height, it is a smooth function of the phase of the lift.
+def _follow(planned: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any, origin: Any, tips: Any) -> None:
+    """Write the targets of the tips, which move evenly between two steps of the plan, to `tips`.
 
-    The phase, 0 to 1, tends to 1 in swing and to 0 in stance, and to the share of `landing` [mm] left to the AEP.
-    """
-    x, y, stance, aep, own_height = wanted
+    Unless planned, the height is a smooth function of the phase of the lift. The phase rises to 1 in swing. It is
+    lowered to 0 in stance, and over the last `landing` [mm] before the AEP to the share of `landing` that is left."""
+    x, y, stance, aep, own_height = planned
     x_old, y_old, s_old, lift, height_old = last
     rise, sink, landing = rates
     step_height, standing_height = heights
@@ -199,8 +199,8 @@ def _follow(wanted: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any, 
                     part = (sub + 1.0) / m
                     at = x_from + (x_to - x_from) * part
                     left = end - at if ahead else at - end
-                    wanted = 0.0 if s else 1.0 if np.isnan(end) else min(max(left / landing, 0.0), 1.0)
-                    phase = min(phase + rise, max(phase - sink, wanted))
+                    goal = 0.0 if s else 1.0 if np.isnan(end) else min(max(left / landing, 0.0), 1.0)
+                    phase = min(phase + rise, max(phase - sink, goal))
                     if np.isnan(own):
                         height = step_height * (EVENLY * phase + (1.0 - EVENLY) * phase**4 * (5.0 - 4.0 * phase))
                     else:

@@ -1,4 +1,4 @@
-"""Outcomes of physical walks: the measured walk, how every start went, and the effort, chunk by chunk."""
+"""Outcomes of physical walks, added up chunk by chunk: measured walks, losses of stability, falls and effort."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -15,46 +15,46 @@ from hexmj.stability import loss_time
 from hexmj.walks import PlannedWalk, Walk
 
 TOPPLED = 0.1
-"""Tilt of the trunk beyond which it has toppled, in any direction [rad]."""
+"""Tilt of the trunk, in any direction, beyond which a start counts as toppled [rad]."""
 
 MOST_UNREACHABLE = 0.1
-"""Greatest share of the targets that may be out of reach."""
+"""Maximum share of a walk's foot targets that may be out of reach."""
 
 LEAST_UPRIGHT = float(np.cos(TOPPLED))
-"""Upward component of the trunk's vertical at the tilt `TOPPLED`."""
+"""Upward component of the trunk's vertical axis, a unit vector, at the tilt `TOPPLED`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outcomes:
-    """How every start went; times in time units, inf for events that did not happen."""
+    """Outcomes of each start. Times are in time units, inf for events that did not happen. Measures end at the fall."""
 
     planned_loss: np.ndarray
-    """(start,) first loss of static stability of the plan: planned polygon, centre of mass at O."""
+    """(start,) time of the plan's first loss of static stability, with planned stance and the centre of mass at O."""
     measured_loss: np.ndarray
-    """(start,) first loss of measured static stability: feet in contact, the body's centre of mass."""
+    """(start,) time of the first measured loss of static stability: feet in contact, the body's centre of mass."""
     fall: np.ndarray
-    """(start,) first contact of head, thorax or abdomen with the ground."""
+    """(start,) time at which the trunk first touches the ground (environments detect falls in `observing.judge`)."""
     topple: np.ndarray
-    """(start,) first tilt of the trunk by more than `TOPPLED`; until the fall, like all measures here."""
+    """(start,) time at which the trunk is first tilted by more than `TOPPLED`."""
     fall_part: np.ndarray
-    """(start,) index in `Body.trunk` of the part that touched first, -1 for none."""
+    """(start,) index in `Body.trunk` of the part that touches the ground first; -1 without a fall."""
     clearance: np.ndarray
-    """(start,) least height of the trunk's lowest point above z = 0 [mm]; negative if it sinks in on contact."""
+    """(start,) least height of the trunk's lowest point above z = 0 [mm]; negative if the trunk sinks in on contact."""
     tilt: np.ndarray
-    """(start,) greatest angle between the trunk's vertical and the world's [rad]."""
+    """(start,) greatest angle between the trunk's vertical axis and the world's [rad]."""
     speed: np.ndarray
-    """(start,) distance walked in the initial heading over distance commanded, until the fall; NaN at V = 0."""
+    """(start,) distance walked in the initial heading, divided by the commanded distance; NaN at V = 0."""
     slip: np.ndarray
     """(start,) mean sliding speed of a foot in contact [mm/s]."""
     tracking: np.ndarray
-    """(start,) 95th percentile of the distance between a foot and its target while that is on the ground [mm], in bins
-    of `Lengths.tracking_bin`: to 0.01 mm, and inf beyond 20 mm, for the stick insect."""
+    """(start,) 95th percentile of the distance between a foot and its target, for targets on the ground [mm]. It is a
+    multiple of `Lengths.tracking_bin`; for the stick insect of 0.01 mm, with inf for more than 20 mm."""
     depth: np.ndarray
-    """(start,) greatest depth of a foot in the ground until the fall [mm]."""
+    """(start,) greatest depth of a foot in the ground [mm]."""
     saturation: np.ndarray
-    """(start,) fraction of joints times physics steps in which the torque is at its limit."""
+    """(start,) fraction of all joints and physics steps in which the torque is at its limit."""
     unreachable: np.ndarray
-    """(start,) targets out of reach; such a leg keeps its last angles."""
+    """(start,) number of foot targets out of reach; the leg then keeps its last joint angles."""
 
     def __repr__(self) -> str:
         times = {"planned loss": self.planned_loss, "measured loss": self.measured_loss, "fell": self.fall}
@@ -65,31 +65,31 @@ class Outcomes:
 
 
 class _Sums(NamedTuple):
-    """Sums and extremes of every start so far."""
+    """Sums and extremes over the substeps of each start so far."""
 
     clearance: np.ndarray
     """(start,) see `Outcomes.clearance`."""
     upright: np.ndarray
-    """(start,) least upward component of the trunk's vertical."""
+    """(start,) least upward component of the trunk's vertical axis, a unit vector."""
     toppled: np.ndarray
-    """(start,) substeps until the trunk has toppled; inf if it has not."""
+    """(start,) number of substeps until the trunk topples; inf if it does not."""
     slid: np.ndarray
-    """(start,) distance that feet slid in contact [mm]."""
+    """(start,) distance that all feet slid in contact [mm]."""
     contacts: np.ndarray
-    """(start,) substeps in which a foot was in contact, over all feet."""
+    """(start,) number of substeps in contact, summed over the feet."""
     saturated: np.ndarray
-    """(start,) substeps in which a torque was at its limit, over all joints."""
+    """(start,) number of substeps at the torque limit, summed over the joints."""
     shown: np.ndarray
-    """(start,) substeps."""
+    """(start,) number of substeps so far."""
     misses: np.ndarray
-    """(start, bin) counts of distances of feet from their targets."""
+    """(start, bin) histogram of the distances of feet from their targets."""
 
 
 class OutcomesSoFar:
     """Adds up the outcomes of all starts, chunk by chunk."""
 
     def __init__(self, settled: Settled, planned_loss: np.ndarray) -> None:
-        """Begin with the plan's losses, (start,) [time units]."""
+        """Begin with the times of the plan's first losses of stability, (start,) [time units]."""
         size, compiled, lengths = len(settled.starts), settled.compiled, settled.conditions.body.lengths
         self._settled, self._planned_loss = settled, planned_loss
         self._measured_loss, self._fall = np.full(size, np.inf), np.full(size, np.inf)
@@ -105,7 +105,7 @@ class OutcomesSoFar:
         self._scale = ground, lengths.tracking_bin
 
     def add(self, chunk: Chunk) -> None:
-        """Take in one chunk of `rollout.drive`."""
+        """Add one chunk of `rollout.drive`."""
         settled, ids, dt, m = self._settled, chunk.ids, self._settled.stride.dt, self._settled.substeps
         seen = chunk.qpos, chunk.sensors, np.ascontiguousarray(chunk.targets), chunk.force, chunk.valid
         since = self._before, chunk.first, len(chunk.plan.time) * m, steps_in_chunk(m) * m
@@ -129,11 +129,11 @@ class OutcomesSoFar:
             self._measured_loss[ids[stable]] = loss_time(measured, threads=1)
 
     def outcomes(self) -> Outcomes:
-        """How every start went in the chunks so far.
+        """Return the outcomes of each start in the chunks so far.
 
         Raises:
-            OutOfReach: more than `MOST_UNREACHABLE` of a walk's targets are out of reach.
-            SimulationError: a measure of a walk is NaN, as the slip if no foot is ever in contact.
+            OutOfReach: the share of a walk's targets that are out of reach exceeds `MOST_UNREACHABLE`.
+            SimulationError: a measure of a walk is NaN, for example the slip if no foot is ever in contact.
         """
         sums, compiled, lengths = self._sums, self._settled.compiled, self._settled.conditions.body.lengths
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -167,7 +167,7 @@ class OutcomesSoFar:
 
 
 class WalkSoFar(OutcomesSoFar):
-    """Keeps the walks of all starts whole, chunk by chunk, and adds up their outcomes; see `PhysicalWalk`."""
+    """Stores the walks of all starts, chunk by chunk, for `PhysicalWalk`, and adds up their outcomes."""
 
     def __init__(self, settled: Settled, planned: PlannedWalk, threads: int | None = None) -> None:
         """Begin with the plan of the whole walk."""
@@ -179,7 +179,7 @@ class WalkSoFar(OutcomesSoFar):
         self.measured = Walk(planned.time, planned.velocity, x, y, stance, planned.geometry)
 
     def add(self, chunk: Chunk) -> None:
-        """Take in one chunk of `rollout.drive`."""
+        """Add one chunk of `rollout.drive`."""
         super().add(chunk)
         columns, seen, centre = measured_walk(chunk, self._settled)
         compiled, sensors, over = self._settled.compiled, chunk.sensors[:, columns], columns[:, None] >= chunk.valid
@@ -197,7 +197,7 @@ class WalkSoFar(OutcomesSoFar):
 
 
 def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
-    """Upper end [mm] of the bin that holds this share of the counts, (start, bin); inf for the last, open one."""
+    """Return the end [mm] of the bin in which a share of the counts, (start, bin), is reached; inf for the last bin."""
     reached = np.cumsum(counts, axis=1) >= share * counts.sum(axis=1, keepdims=True)
     ends = np.append(np.arange(1, counts.shape[1]) * width, np.inf)
     return np.where(counts.any(axis=1), ends[np.argmax(reached, axis=1)], np.nan)
@@ -206,16 +206,16 @@ def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
 def measured_walk(
     chunk: Chunk, settled: Settled, rows: np.ndarray | None = None
 ) -> tuple[np.ndarray, Walk, np.ndarray]:
-    """The measured walk at the plan's steps within a chunk.
+    """Return the measured walk at the ends of the plan's steps within a chunk.
 
     Args:
-        chunk: of `rollout.drive`.
-        settled: starts of the walk.
-        rows: rows of the chunk's starts, (n,), by default all.
+        chunk: a chunk of `rollout.drive`.
+        settled: all starts of the walk.
+        rows: rows of the chunk whose starts are measured, (n,), by default all.
 
     Returns:
-        Columns of the chunk's substeps, (step,), the walk of these starts, and the centre of mass in the world,
-        (step, n, 3) [mm]. After a fall the walk is NaN and no foot stands; its velocities are NaN throughout.
+        Substeps of the chunk at which these steps end, (step,); the walk of the starts; and the centre of mass in the
+        world, (step, n, 3) [mm]. After a fall the walk is NaN and no foot stands. The walk's velocities are all NaN.
     """
     m, stride, columns = settled.substeps, settled.stride, settled.compiled.columns
     rows = np.arange(len(chunk.ids)) if rows is None else rows
@@ -224,33 +224,33 @@ def measured_walk(
     shape = len(shown), len(rows)
     x, y, stance = np.full((*shape, 6), np.nan), np.full((*shape, 6), np.nan), np.zeros((*shape, 6), dtype=bool)
     centre, places = np.full((*shape, 3), np.nan), (columns.foot.start, columns.centre_of_mass.start)
-    _look((chunk.qpos, chunk.sensors, chunk.standing, chunk.valid), rows, shown, places, (x, y, stance, centre))
+    _measure((chunk.qpos, chunk.sensors, chunk.standing, chunk.valid), rows, shown, places, (x, y, stance, centre))
     time, velocity = (chunk.first + shown) // m * stride.dt, np.full(shape, np.nan)
     walk = Walk(time, velocity, x - np.array(stride.geometry.origin), y, stance, stride.geometry)
     return shown, walk, centre
 
 
 class EffortSoFar:
-    """Adds up the positive work of the joints and their greatest torque, chunk by chunk, of each start until it falls.
+    """Positive work of the joints and their greatest torque until the fall of each start, updated chunk by chunk.
 
-    Work is the sum over joints and physics steps of max(torque x speed, 0) h: a joint that is moved against its torque
-    does no work and returns none. The torque is `Chunk.torque`.
+    Work is the sum over joints and physics steps of max(torque x speed, 0) h, with `Chunk.torque` and the step h. A
+    joint that moves against its torque does no work and recovers none.
     """
 
     work: np.ndarray
-    """(start,) [g mm^2/s^2]."""
+    """(start,) positive work of all joints [g mm^2/s^2]."""
     torque: np.ndarray
-    """(start,) greatest torque of a joint over its limit."""
+    """(start,) greatest torque of a joint, as a fraction of the torque limit."""
 
     def __init__(self, settled: Settled) -> None:
-        """Begin without work."""
+        """Begin with zero work and torque."""
         size, compiled = len(settled.starts), settled.compiled
         self.work, self.torque = np.zeros(size), np.zeros(size)
         self._columns, self._limits = compiled.columns, compiled.torque_limits
-        self._rows = np.zeros((size, 0, 2, compiled.joints))  # last angles and torques of the chunk before
+        self._rows = np.zeros((size, 0, 2, compiled.joints))  # last angles and torques of the previous chunk
 
     def add(self, chunk: Chunk) -> None:
-        """Take in one chunk; its last step counts with the next one."""
+        """Add one chunk; the work of its last substep is added with the next chunk, which has the angles after it."""
         before = self._rows[chunk.ids]
         now = np.stack([chunk.qpos[..., self._columns.qpos], chunk.torque], axis=2)
         rows = np.concatenate([before, now], axis=1)
@@ -267,14 +267,14 @@ class EffortSoFar:
 def _scan(chunk: Any, since: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
     """Add a chunk's substeps to the sums of its starts.
 
-    Sliding to the first substep of a chunk of usual length does not count, wherever pushes cut chunks.
+    Sliding to a substep at which a chunk of default length would begin does not count, even if pushes shorten chunks.
     """
     qpos, sensors, targets, force, valid = chunk
-    last, first, end, usual = since
+    last, first, end, default_length = since
     feet, touch, corner, radius, limit = body
     for i, start in enumerate(ids):
         for t in range(valid[i]):
-            slides = t == end or (first + t) % usual != 0
+            slides = t == end or (first + t) % default_length != 0
             q, sensed, before = qpos[i, t], sensors[i, t], sensors[i, t - 1] if t > 0 else last[start]
             _count_misses(q, sensed[feet : feet + 18], targets[i, t], scale, sums.misses[start])
             _, _, _, _, _, _, _, _, up_z = matrix(q[3], q[4], q[5], q[6])
@@ -308,8 +308,8 @@ def _count_misses(qpos: Any, feet: Any, targets: Any, scale: Any, counts: Any) -
 
 
 @jitted
-def _look(chunk: Any, rows: Any, shown: Any, places: Any, walk: Any) -> None:
-    """Positions of the feet relative to the centre of mass in the root's heading, up to the fall."""
+def _measure(chunk: Any, rows: Any, shown: Any, places: Any, walk: Any) -> None:
+    """Write the feet until the fall to `walk`: relative to the centre of mass, along the root's heading."""
     qpos, sensors, standing, valid = chunk
     foot, centre_of_mass = places
     x, y, stance, centre = walk

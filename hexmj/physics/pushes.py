@@ -1,4 +1,4 @@
-"""Pushes from the side: how strong, when, and for how many steps of the plan."""
+"""Pushes from the side: their impulses, times and durations."""
 
 from dataclasses import dataclass
 from math import gcd
@@ -14,10 +14,10 @@ PUSH_LASTS = 0.025
 
 
 def steps_pushed(conditions: Conditions, stride: Stride) -> int:
-    """Steps of the plan that a push lasts.
+    """Return the duration of a push as a number of steps of the plan.
 
     Raises:
-        InputError: a step of the plan is longer than a push.
+        InputError: a step of the plan lasts at least twice as long as a push.
     """
     if not can_push(conditions, stride):
         duration, longest = 1e3 * conditions.seconds(stride), 2e3 * PUSH_LASTS
@@ -26,32 +26,34 @@ def steps_pushed(conditions: Conditions, stride: Stride) -> int:
 
 
 def can_push(conditions: Conditions, stride: Stride, observation_time: float = np.inf) -> bool:
-    """Whether a push lasts at least one step of the plan, and the observation time [time units] is long enough."""
+    """Return whether a push lasts at least one step of the plan, and at most the observation time [time units]."""
     return 0 < round(PUSH_LASTS / conditions.seconds(stride)) <= observation_time / stride.dt + 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """A push from the side at the root for each start; it lasts `PUSH_LASTS`, to the nearest step of the plan."""
+    """A push from the side at the root of each start; it lasts `PUSH_LASTS`, rounded to whole steps of the plan."""
 
     impulse: np.ndarray
-    """(start,) to the left [g mm/s]."""
+    """(start,) impulse to the left [g mm/s]; 0 means no push."""
     time: np.ndarray
-    """(start,) at which it begins, rounded down to a step of the plan [time units]."""
+    """(start,) time at which the push begins, rounded down to a step of the plan [time units]."""
 
     def begins(self, stride: Stride) -> np.ndarray:
-        """(start,) steps of the plan before the push."""
+        """Return the number of plan steps before each push, (start,)."""
         return np.floor(self.time / stride.dt + 1e-9).astype(int)
 
     def divisor(self, conditions: Conditions, stride: Stride) -> int:
-        """Greatest common divisor of the steps at which pushes begin and end, so that chunks cut no push; 0 without."""
+        """Return the greatest common divisor of the plan steps at which pushes begin and end; 0 without a push.
+        Chunks whose number of plan steps divides it cut no push."""
         begins = self.begins(stride)[self.impulse != 0.0]
         return gcd(steps_pushed(conditions, stride), *begins.tolist()) if begins.size else 0
 
     def check_within(self, duration: float, conditions: Conditions, stride: Stride, n_starts: int) -> None:
-        """Raise InputError unless there is a push for each start, within a duration [time units]."""
+        """Raise InputError unless impulse and time have one number per start and pushes fit a duration [time units]."""
         if self.impulse.shape != (n_starts,) or self.time.shape != (n_starts,):
-            raise InputError(f"push: expected impulse and time of shape ({n_starts},), a number for each start")
+            shapes = f"{self.impulse.shape} and {self.time.shape}"
+            raise InputError(f"push: impulse and time have the shapes {shapes}; expected ({n_starts},) for both")
         steps, pushed = int(steps_within(duration, stride)), self.impulse != 0.0
         lasts = steps_pushed(conditions, stride) if pushed.any() else 0
         outside = pushed & ((self.time < 0.0) | (self.begins(stride) + lasts > steps))

@@ -1,11 +1,11 @@
-"""Rollouts: settled starts follow a plan in MuJoCo, all at once on all cores, and chunks record what they do.
+"""Rollouts: settled starts follow a plan in MuJoCo, all at once on all cores, and chunks record their walks.
 
-A start whose trunk has touched the ground is dropped. A feedback plan senses the bodies before each of its steps. Any
-other plan goes on by itself: while MuJoCo's threads step one chunk, this thread plans the next, and the caller measures
-the last.
+A start is dropped once its trunk has touched the ground. A feedback plan senses the bodies before each of its steps.
+A plan without feedback is computed ahead: while MuJoCo's threads step one chunk, this thread plans the next chunk, and
+the caller measures the previous one.
 
-A chunk records the bodies before each of their physics steps: MuJoCo's sensors after a step belong to the state before
-it. Of a fine step (`substeps`) it records the first part, except for the ground's forces, the torques and the depth.
+A chunk records the bodies before each physics step, since MuJoCo's sensors after a step belong to the state before it.
+Of a fine step (`substeps`) it records the first part, but means of the ground's forces and of the acting torques.
 """
 
 import math
@@ -33,41 +33,41 @@ from hexmj.rotations import heading, lean, turned
 from hexmj.walks import PlannedWalk, joined
 
 RECORDED = ("qpos", "sensors", "standing", "load", "targets", "force", "torque", "depth")
-"""Fields of `Chunk` that are recorded before each substep."""
+"""Fields of `Chunk` that are recorded for each substep."""
 
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """Record of some physics steps of the starts that still walk."""
+    """Record of consecutive physics steps of the n starts that still walk."""
 
     plan: PlannedWalk
-    """The plan over the chunk, of all starts."""
+    """Plan of all starts over the chunk."""
     first: int
-    """Index of the first substep."""
+    """Index of the chunk's first substep, counted from the beginning of the walk."""
     ids: np.ndarray
     """(n,) indices of the starts that walk."""
     qpos: np.ndarray
-    """(n, substep, position)."""
+    """(n, substep, position) positions at the beginning of each substep."""
     sensors: np.ndarray
-    """(n, substep, column), see `compiled.Columns`; the ground's forces are means over a fine step."""
+    """(n, substep, column) `sensordata`, see `compiled.Columns`; forces of the ground are means over a fine step."""
     standing: np.ndarray
     """(n, substep, leg) whether the ground carried the foot within the last `Conditions.contact_gap`."""
     load: np.ndarray
-    """(n, substep, leg) force of the ground on the foot along its normal, without adhesion [g mm/s^2]."""
+    """(n, substep, leg) normal force of the ground on the foot, without adhesion [g mm/s^2]."""
     targets: np.ndarray
     """(n, substep, leg, 3) targets of the tips in the root frame [mm]."""
     force: np.ndarray
-    """(n, substep, joint) torques of the joints [g mm^2/s^2]."""
+    """(n, substep, joint) torques of the servos at the beginning of each substep [g mm^2/s^2]."""
     torque: np.ndarray
-    """(n, substep, joint) torques as they act over each substep, means over a fine step [g mm^2/s^2]."""
+    """(n, substep, joint) torques that act over each substep, see `engine.Rolled`; means in fine steps [g mm^2/s^2]."""
     depth: np.ndarray
-    """(n, substep) depth of the deepest foot in the ground at the end of each substep [mm]; negative above it."""
+    """(n, substep) depth of the deepest foot in the ground at the end of each substep [mm]; negative above ground."""
     valid: np.ndarray
-    """(n,) substeps up to and including the fall."""
+    """(n,) number of substeps up to and including the fall; without a fall, of all substeps."""
     fell: np.ndarray
-    """(n,) whether the trunk touched the ground."""
+    """(n,) whether the trunk touches the ground within the chunk."""
     unreachable: np.ndarray
-    """(n,) number of targets out of reach."""
+    """(n,) number of foot targets out of reach until the fall."""
 
 
 def drive(
@@ -79,19 +79,19 @@ def drive(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Chunk]:
-    """Walk settled starts by a plan, chunk by chunk.
+    """Yield the chunks in which settled starts walk by a plan.
 
     Args:
         settled: starts at rest.
-        plan: of the same starts, at time 0.
+        plan: plan of the same starts, at time 0.
         duration: observation time [time units].
-        push: from the side.
-        threads: one per core unless given; the result does not depend on it.
+        push: push from the side at each start.
+        threads: number of threads, by default one per core; the result does not depend on it.
         progress: called with the fraction done since the last call.
 
     Raises:
-        InputError: the plan has other starts or another stride, is not at time 0, or returns other shapes than asked
-            for; a push lies outside of the observation time.
+        InputError: the plan has other starts or another stride, is not at time 0, or returns arrays of a wrong shape;
+            or a push lies outside of the observation time.
         SimulationError: a simulation diverged; the error has its last finite state.
         StillThrown: the observation time ends while a push still throws a start; raised after the last chunk.
     """
@@ -114,7 +114,7 @@ def drive(
 
 
 def _planned(rollout: "Rollout", orders: OrdersFromPlan) -> Iterator[Chunk]:
-    """Follow a plan that goes on whatever the bodies do."""
+    """Yield the chunks of a plan without feedback; the next chunk is planned while one is stepped."""
     now = orders.ahead(np.arange(len(rollout.settled.starts)))
     with ThreadPoolExecutor(1) as stepper:
         stepping = now and stepper.submit(rollout.carry_out, [now])
@@ -127,7 +127,7 @@ def _planned(rollout: "Rollout", orders: OrdersFromPlan) -> Iterator[Chunk]:
 
 
 def _with_feedback(rollout: "Rollout", plan: FeedbackPlan, orders: OrdersFromPlan) -> Iterator[Chunk]:
-    """Follow a plan that senses the bodies before each of its steps."""
+    """Yield the chunks of a plan that senses the bodies before each of its steps."""
     ids = np.arange(len(rollout.settled.starts))
     while len(ids) and (steps := orders.steps_ahead()):
         chunk = rollout.carry_out(next_orders(rollout, plan, orders, ids, steps))
@@ -138,7 +138,7 @@ def _with_feedback(rollout: "Rollout", plan: FeedbackPlan, orders: OrdersFromPla
 def next_orders(
     rollout: "Rollout", plan: Plan, orders: OrdersFromPlan, ids: np.ndarray, steps: int
 ) -> Iterator[Orders]:
-    """Orders of some starts, (n,), for the next steps of a plan, one by one if it has feedback."""
+    """Yield the orders of the starts `ids`, (n,), for the next steps of a plan: step by step if it has feedback."""
     feedback = plan if isinstance(plan, FeedbackPlan) else None
     for part in [1] * steps if feedback else [steps]:
         if feedback:
@@ -148,10 +148,10 @@ def next_orders(
 
 
 class Rollout:
-    """Settled starts that carry out orders."""
+    """Settled starts that carry out orders in MuJoCo."""
 
     def __init__(self, settled: Settled, push: Push | None = None, threads: int | None = None) -> None:
-        """Put all starts at rest; `threads` step them, one per core unless given."""
+        """Put all starts at rest; `threads` threads step them, by default one per core."""
         self.settled, self._push, self._columns = settled, push, settled.compiled.columns
         self._pushed = np.zeros(len(settled.starts))  # sum of the impulses' sizes [g mm/s]
         self._batch = MujocoBatch(settled.compiled, len(settled.starts), threads)
@@ -159,41 +159,41 @@ class Rollout:
         self._steps, self._senses = FineSteps.of(self._batch, settled.substeps, settled.compiled), Senses(settled)
 
     def sensed(self, ids: np.ndarray) -> Sensed:
-        """What some starts, (n,), sense now."""
+        """Return what the starts `ids`, (n,), sense now."""
         return self._senses.sensed(ids, self._batch.qpos[ids], self._batch.qvel[ids])
 
     def carry_out(self, orders: Iterable[Orders]) -> Chunk:
-        """Carry out orders for the same starts, one after the other; no push begins or ends within them.
+        """Carry out successive orders for the same starts and return their chunk; no push begins or ends within it.
 
-        Each is made when those before it are done, so it may depend on them.
+        Each item of `orders` is requested after the previous item is carried out, so it may depend on the new state.
 
         Raises:
             SimulationError: a simulation diverged or exploded.
-            InputError: a walk leaves the ground.
+            InputError: a walk crosses an edge of the ground.
         """
         first = next(rest := iter(orders))
         self._apply_push(first)
         before = self._batch.states(first.ids)
         done, records = [first], [self._step(first)]
-        for each in rest:
-            records.append(self._step(each))
-            done.append(each)
+        for order in rest:
+            records.append(self._step(order))
+            done.append(order)
         whole: dict[str, Any] = {name: _joined([record[name] for record in records]) for name in RECORDED}
         touching = (whole["sensors"][:, :, self._columns.trunk] > 0).any(axis=2)
         fell = touching.any(axis=1)
         valid = np.where(fell, np.argmax(touching, axis=1) + 1, touching.shape[1])
         centre = whole["sensors"][:, :, self._columns.centre_of_mass]
-        if odd := explosion(whole["qpos"], centre, valid, self._pushed[first.ids], self.settled):
-            row, substep, what = odd
-            raise self._error(Diverged(int(first.ids[row]), what, self._batch.named(before[row]), substep), first)
+        if exploded := explosion(whole["qpos"], centre, valid, self._pushed[first.ids], self.settled):
+            row, substep, text = exploded
+            raise self._error(Diverged(int(first.ids[row]), text, self._batch.named(before[row]), substep), first)
         self._check_ground(whole["sensors"], valid, first.ids)
-        missed = _joined([each.missed for each in done]).sum(axis=2)
+        missed = _joined([order.missed for order in done]).sum(axis=2)
         unreachable = np.where(np.arange(missed.shape[1]) < valid[:, None], missed, 0).sum(axis=1)
-        plan = joined([each.plan for each in done])
+        plan = joined([order.plan for order in done])
         return Chunk(plan, first.first, first.ids, **whole, valid=valid, fell=fell, unreachable=unreachable)
 
     def check_landed(self, ids: np.ndarray) -> None:
-        """Raise StillThrown if a root of these starts, (n,), which have not fallen, moves as only pushed ones do."""
+        """Raise StillThrown if a push still gives one of the starts `ids`, (n,), more energy than a walk has."""
         pushed, settled = self._pushed[ids] != 0.0, self.settled
         speed = np.linalg.norm(self._batch.qvel[ids, :3], axis=1)
         height = self._batch.qpos[ids, 2] - settled.conditions.highest_ground
@@ -201,11 +201,11 @@ class Rollout:
         for row in np.flatnonzero(pushed & (energy > most)):
             raise StillThrown(
                 f"start {ids[row]} is still thrown by its push at the end: its root is {height[row]:.3g} mm above the"
-                f" ground and moves at {speed[row]:.3g} mm/s; expected a longer observation time or a weaker push"
+                f" ground and moves at {speed[row]:.3g} mm/s; use a longer observation time or a weaker push"
             )
 
     def _step(self, orders: Orders) -> Shown:
-        """Take the orders' substeps and record them."""
+        """Step the bodies over the substeps of the orders, and return the record by the names in `RECORDED`."""
         ids, width = orders.ids, self._batch.qpos.shape[1]
         before = self._batch.qpos[ids, None]
         try:
@@ -222,7 +222,7 @@ class Rollout:
         }
 
     def _check_ground(self, sensors: np.ndarray, valid: np.ndarray, ids: np.ndarray) -> None:
-        """Raise InputError if a walk, (n, substep, column) until it falls, leaves the ground."""
+        """Raise InputError if a foot crosses an edge of the ground before the fall."""
         conditions = self.settled.conditions
         feet = sensors[:, :, self._columns.foot].reshape(len(ids), -1, 6, 3)
         beyond = beyond_the_ground(conditions, feet).any(axis=2)
@@ -231,16 +231,16 @@ class Rollout:
             row, substep = np.argwhere(beyond)[0]
             x, y, _ = feet[row, substep].mean(axis=0).round().tolist()
             place = f"x = {x:g} mm, y = {y:g} mm"
-            raise InputError(f"start {ids[row]} leaves the {conditions.ground} at {place}; expected a shorter walk")
+            raise InputError(f"start {ids[row]} leaves the {conditions.ground} at {place}; use a shorter walk")
 
     def _error(self, error: Diverged, orders: Orders) -> SimulationError:
-        """The user's error of a start that diverged while it carried out orders."""
+        """Return the user's error for a start that diverged while it carried out orders."""
         time = orders.plan.time[0] + (error.substep / self.settled.substeps - 1) * self.settled.stride.dt
         doing = f"walking at V = {orders.plan.velocity[0, error.start]:g}"
         return walk_error(error, doing, time)
 
     def _apply_push(self, orders: Orders) -> None:
-        """Push the starts whose push acts when the orders begin."""
+        """Apply the forces of all pushes that act when the orders begin, and no others."""
         if self._push:
             self._batch.push[:] = 0.0
         if self._push and self._push.impulse.any():
@@ -253,10 +253,10 @@ class Rollout:
 
 
 class Senses:
-    """Senses of settled starts; a foot stands if the ground carried it within the last `Conditions.contact_gap`."""
+    """Sensory state of starts; a foot stands if the ground carried it within the last `Conditions.contact_gap`."""
 
     def __init__(self, settled: Settled) -> None:
-        """All feet stand."""
+        """Begin with all feet standing."""
         self._compiled = settled.compiled
         self._unloaded = np.zeros(settled.starts.shape, dtype=int)  # substeps since the ground last carried a foot
         gap = settled.conditions.contact_gap / 1000.0 / settled.compiled.model.opt.timestep
@@ -265,21 +265,21 @@ class Senses:
         self._load, self._torques = settled.load.copy(), settled.torques.copy()
 
     def restart(self, ids: np.ndarray, settled: Settled) -> None:
-        """Put some starts at rest again, as others that were settled, (n,)."""
+        """Put the starts `ids`, (n,), at rest again, with the loads and torques of `settled`."""
         self._unloaded[ids], self._before[ids] = 0, True
         self._load[ids], self._torques[ids] = settled.load, settled.torques
 
     def feel(self, ids: np.ndarray, sensors: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Take in the next substeps of some starts.
+        """Update the sensory state of some starts by their next substeps.
 
         Args:
-            ids: of the starts, (n,).
-            sensors: as of `engine.Rolled`.
-            force: of the actuators, the joints' first, (n, substep, actuator).
+            ids: indices of the starts, (n,).
+            sensors: `sensordata` of each substep, (n, substep, column).
+            force: forces of the actuators, joints first, (n, substep, actuator).
 
         Returns:
-            Which feet stand after each substep, and the force of the ground on them along its normal, without adhesion
-            [g mm/s^2], both (n, substep, leg).
+            Whether each foot stands in each substep, and the normal force of the ground on it, without adhesion
+            [g mm/s^2]; both are (n, substep, leg).
         """
         felt = self._unloaded, self._load, self._torques
         loads = self._compiled.carried(sensors, force)
@@ -287,16 +287,16 @@ class Senses:
         return _feel(ids, touch, loads, force, self._longest_gap, felt), loads
 
     def standing(self, ids: np.ndarray | slice = np.s_[:]) -> np.ndarray:
-        """Which feet of some starts stand now, (n, leg), by default of all."""
+        """Return whether each foot of the starts `ids` stands now, (n, leg); by default for all starts."""
         return self._unloaded[ids] <= self._longest_gap
 
     def sensed(self, ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> Sensed:
-        """What some starts sense; contacts gained and lost are those since the last call.
+        """Return what some starts sense now; contacts are gained or lost relative to the previous call.
 
         Args:
-            ids: of the starts, (n,).
-            qpos: (n, position).
-            qvel: (n, velocity).
+            ids: indices of the starts, (n,).
+            qpos: present positions, (n, position).
+            qvel: present velocities, (n, velocity).
         """
         before, contact = self._before[ids], self.standing(ids)
         self._before[ids] = contact
@@ -318,7 +318,7 @@ class Senses:
 
 @jitted
 def _feel(ids: Any, touch: Any, loads: Any, force: Any, longest_gap: int, felt: Any) -> Any:
-    """See `Senses.feel`; updates `felt`: substeps without touch and load, (start, leg), and torques, (start, joint)."""
+    """Compute `Senses.feel` and update `felt`: substeps without touch, loads, (start, leg), torques, (start, joint)."""
     unloaded, load, torques = felt
     standing = np.empty(touch.shape, dtype=np.bool_)
     for i, start in enumerate(ids):
@@ -333,5 +333,5 @@ def _feel(ids: Any, touch: Any, loads: Any, force: Any, longest_gap: int, felt: 
 
 
 def _joined(values: list[np.ndarray]) -> np.ndarray:
-    """Join values over the substeps, (n, substep, ...)."""
+    """Join arrays, (n, substep, ...), along the substeps."""
     return values[0] if len(values) == 1 else np.concatenate(values, axis=1)

@@ -1,4 +1,4 @@
-"""Settling: every start is put on its six feet in MuJoCo and comes to rest before it walks."""
+"""Settling: MuJoCo puts each start on its six feet, where it comes to rest before it walks."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,56 +18,56 @@ from hexmj.starts import checked_starts, draw_starts
 from hexmj.timing import Stride
 
 RESTING = 2.0 / 3.0
-"""Share of the depth that causes fine steps to which adhesion may press a foot at rest; the rest is for walking."""
+"""Maximum depth of a foot at rest with adhesion, as a share of the depth that causes fine steps (`substeps.SINK`)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """Starts at rest in MuJoCo; the same for every controller and velocity."""
+    """Starts at rest in MuJoCo, from which walks with any controller and velocity begin."""
 
     starts: np.ndarray
     """(start, leg) planned tips on their own axes [mm]."""
     tips: np.ndarray
-    """(start, leg, 3) the same in the root frame [mm]."""
+    """(start, leg, 3) planned tips in the root frame [mm]."""
     state: np.ndarray
-    """(start, state) positions, velocities and the solver's initial values; `engine.Engine.put` takes it."""
+    """(start, state) positions, velocities and the solver's initial values, as `engine.Engine.put` takes them."""
     ctrl: np.ndarray
-    """(start, actuator) joint targets of the planned tips [rad], and the feet's adhesion with `Conditions.grasp`."""
+    """(start, actuator) joint targets for the planned tips [rad], followed by the feet's adhesion, if any."""
     load: np.ndarray
-    """(start, leg) force of the ground on each foot along its normal, without adhesion [g mm/s^2]."""
+    """(start, leg) normal force of the ground on each foot, without adhesion [g mm/s^2]."""
     torques: np.ndarray
-    """(start, joint) of the servos [g mm^2/s^2]."""
+    """(start, joint) torques of the servos [g mm^2/s^2]."""
     compiled: CompiledBody
-    """With the time step and the conditions of the walk."""
+    """Body compiled with the time step and the conditions of the walk."""
     conditions: Conditions
-    """Of the walk."""
+    """Conditions of the walk."""
     stride: Stride
-    """Of the plan."""
+    """Stride of the plan."""
     substeps: int
     """Physics steps in one step of the plan."""
 
     @property
     def qpos(self) -> np.ndarray:
-        """(start, position)."""
+        """(start, position) positions at rest."""
         return self.state[:, : self.compiled.model.nq]
 
 
 @dataclass(eq=False)
 class Settling:
-    """A body that comes to rest at different starts, to the same bits whatever it did before.
+    """Settles starts with one compiled body; earlier calls do not change the bits of the result.
 
     Raises:
-        InputError: posture home is not as described.
+        InputError: posture home does not fit the description of the body.
     """
 
     conditions: Conditions
-    """Of the walk."""
+    """Conditions of the walk."""
     stride: Stride
-    """Of the plan."""
+    """Stride of the plan."""
     threads: int | None = None
-    """One per core unless given."""
+    """Number of threads, by default one per core."""
     pushes: bool = False
-    """Measure the forces of the feet on the ground."""
+    """Whether to measure the forces of the feet on the ground."""
 
     def __post_init__(self) -> None:
         timestep = self.conditions.timestep(self.stride)
@@ -76,11 +76,11 @@ class Settling:
         self._batch: MujocoBatch | None = None
 
     def at(self, starts: ArrayLike, names: np.ndarray | None = None) -> Settled:
-        """Settle at every start, (start, leg) [mm].
+        """Return the settled starts.
 
         Args:
             starts: planned tips, (start, leg) [mm].
-            names: numbers of the starts in errors, (start,), by default their rows.
+            names: indices of the starts in error messages, (start,), by default their rows.
 
         Raises:
             InputError, SimulationError: see `settle`.
@@ -122,29 +122,25 @@ class Settling:
 def settle(
     starts: ArrayLike, conditions: Conditions | None = None, stride: Stride | None = None, threads: int | None = None
 ) -> Settled:
-    """Put the insect on its six feet at every start and let it come to rest.
+    """Put the insect on its six feet at each start and let it come to rest.
 
     Args:
         starts: planned tips, (start, leg) [mm].
-        conditions: of the walk.
-        stride: of the plan.
-        threads: one per core unless given.
+        conditions: conditions of the walk.
+        stride: stride of the plan.
+        threads: number of threads, by default one per core.
 
     Raises:
-        InputError: a start is out of reach, posture home is not as described, or the adhesion is too strong.
-        SimulationError: a start does not settle: it still moves, a foot is off the ground, or the trunk is on it.
+        InputError: a start is out of reach, posture home does not fit the body, or the adhesion is too strong.
+        SimulationError: a start does not settle: it still moves, a foot is off the ground, or the trunk touches it.
     """
     return Settling(conditions or Conditions(), stride or Stride(), threads).at(starts)
 
 
 def check_adhesion(conditions: Conditions, stride: Stride, seed: int) -> None:
-    """Check with the first start of a seed, before a study, that adhesion does not press the feet too deep.
-
-    Raises:
-        InputError: it does.
-    """
+    """Raise InputError if adhesion presses the feet too deep into the ground, at the first start of a seed."""
     if conditions.grasp > 0:
-        with suppress(OutOfReach, SimulationError):  # the walk itself reports these
+        with suppress(OutOfReach, SimulationError):  # the walk reports these errors
             settle(draw_starts(1, seed, stride), conditions, stride, threads=1)
 
 
@@ -167,12 +163,12 @@ def _check_rest(batch: MujocoBatch, load: np.ndarray, names: np.ndarray, compile
 def _check_grasp(feet: np.ndarray, compiled: CompiledBody) -> None:
     """Raise InputError if adhesion presses feet at rest, (start, leg * axis) [mm], too deep into the ground.
 
-    Every step would be a fine step then, with contacts so hard that they throw the insect off.
+    Otherwise every step would be a fine step, whose hard contacts would throw the insect off the ground.
     """
     deepest, grasp = compiled.depth(feet.reshape(len(feet), 6, 3)).max(), compiled.conditions.grasp
     allowed = RESTING * SINK * compiled.conditions.standing_height
     if deepest > allowed:
         raise InputError(
-            f"grasp = {grasp:g} presses feet {deepest:.3g} mm into the ground at rest, more than {allowed:.3g} mm;"
+            f"grasp = {grasp:g} presses feet {deepest:.3g} mm into the ground at rest (limit: {allowed:.3g} mm);"
             f" expected at most about {grasp * allowed / deepest:.2g}"
         )

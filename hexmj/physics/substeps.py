@@ -1,11 +1,11 @@
-"""Fine steps: a step of the plan in which a foot sinks into the ground is repeated with shorter physics steps.
+"""Fine steps: a step of the plan in which a foot strikes the ground is repeated with shorter physics steps.
 
-A body that tips, or a swing that ends early, brings a foot down at 0.4 m/s and more. One physics step takes it 0.25 mm
-into the ground before a contact can act, so it needs shorter steps and a contact as hard as they allow. Only the few
-steps of the plan that need it are divided.
+If a body tips or a swing ends early, a foot comes down at 0.4 m/s and more. Such a foot moves 0.25 mm into the ground
+in one physics step, before the contact can act. It needs shorter steps, and contacts as hard as these steps allow.
+Only the few steps of the plan that need it are repeated.
 
-Whether a step is repeated depends on its own body only, so results do not depend on the batch. A body that diverges
-is an error even in a step that would have been repeated.
+Whether a step is repeated depends only on the body itself, so results do not depend on the rest of the batch. A body
+that diverges is an error, even in a step that would be repeated.
 """
 
 from collections.abc import Callable
@@ -19,47 +19,47 @@ from hexmj.jitted import jitted
 from hexmj.physics.engine import Diverged, Engine
 
 Shown = dict[str, np.ndarray]
-"""Record of some bodies by name, each (n, substep, ...): sensors, force, torque, depth, and the states after."""
+"""Record of n bodies: sensors, force, torque, depth and the states after each substep, by name, (n, substep, ...)."""
 
 SINK = 0.02
-"""Allowed depth of a foot in the ground, as a share of the standing height."""
+"""Depth of a foot in the ground, as a share of the standing height, beyond which steps are repeated."""
 
 FINER, FINEST = 4, 64
-"""Number of parts of a physics step, again and again while a foot sinks in; and their greatest number."""
+"""Factor by which a physics step is divided, repeatedly while a foot sinks too deep, and maximum number of parts."""
 
 BRAKED = 0.5
-"""Assumed share of its speed that a foot in the ground keeps over a physics step; measured are 0.2 to 0.7."""
+"""Assumed share of its speed that a foot in the ground keeps over one physics step; measured: 0.2 to 0.7."""
 
 
 @dataclass(frozen=True, eq=False)
 class FineSteps:
-    """Takes whole steps of a plan, and repeats those more finely in which a foot strikes."""
+    """Takes whole steps of a plan, and repeats steps in which a foot strikes the ground with shorter physics steps."""
 
     engine: Engine
-    """Steps the bodies."""
+    """Engine that steps the bodies."""
     substeps: int
     """Physics steps in one step of the plan."""
     depth_of: Callable[[np.ndarray], np.ndarray]
-    """Depth of feet in the world in the ground, (..., 3) -> (...) [mm]."""
+    """Function from feet in the world, (..., 3) [mm], to their depth in the ground, (...) [mm]."""
     allowed: float
-    """Allowed depth of a foot [mm]."""
+    """Depth of a foot in the ground beyond which a step is repeated [mm]."""
     forces: np.ndarray
-    """Columns of the sensors that are forces, (column,)."""
+    """Columns of the sensors that measure forces, (column,)."""
 
     @classmethod
     def of(cls, engine: Engine, substeps: int, compiled: CompiledBody) -> "FineSteps":
-        """For an engine that steps this body."""
+        """Return the fine steps for an engine that steps a compiled body."""
         columns = compiled.columns
         forces = np.r_[columns.touch, columns.feet_push]
         return cls(engine, substeps, compiled.depth, allowed_depth(compiled), forces)
 
     def take(self, ids: np.ndarray, control: np.ndarray) -> Shown:
-        """Let some bodies take the substeps of these controls, (n, substep, actuator), and record them.
+        """Step the bodies `ids` over the substeps of some controls, (n, substep, actuator), and return their record.
 
-        A body whose foot strikes the ground is put back to the beginning of that step of the plan and repeats it.
+        If a foot strikes the ground, its body is put back to the beginning of that step of the plan and repeats it.
 
         Raises:
-            Diverged: a body that diverged.
+            Diverged: the first body that diverges.
         """
         m, end = self.substeps, control.shape[1]
         before, shown, struck = self._roll(ids, control, 0, end, 1)
@@ -67,20 +67,20 @@ class FineSteps:
             again, then = np.flatnonzero(struck == begin), min(begin + m, end)
             few, struck[again] = ids[again], end
             self.engine.put(few, shown["after"][again, begin - 1] if begin else before[again])
-            _show(shown, again, begin, self._roll_finely(few, control[again], begin, then, FINER))
+            _overwrite(shown, again, begin, self._roll_finely(few, control[again], begin, then, FINER))
             if then < end:
                 _, rest, struck[again] = self._roll(few, control[again], then, end, 1)
-                _show(shown, again, then, rest)
+                _overwrite(shown, again, then, rest)
         return shown
 
     def _roll(
         self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int
     ) -> tuple[np.ndarray, Shown, np.ndarray]:
-        """Take some substeps in parts.
+        """Step bodies from substep `begin` to `end`, each substep in so many parts.
 
         Returns:
-            The states before, (n, state), the record of every part, and the beginning of the first step in which a foot
-            strikes, (n,), or `end`.
+            The states before, (n, state), the record of every part, and the first substep of the first step of the plan
+            in which a foot strikes, (n,), or `end`.
         """
         try:
             seen = self.engine.roll(ids, control[:, begin:end].repeat(parts, axis=1), parts)
@@ -95,7 +95,7 @@ class FineSteps:
         return seen.before, shown, struck
 
     def _roll_finely(self, ids: np.ndarray, control: np.ndarray, begin: int, end: int, parts: int) -> Shown:
-        """Take one step's substeps in parts, in more where a foot still strikes; record every substep."""
+        """Take the substeps of one plan step in parts, in more parts while a foot strikes; return their record."""
         before, every, struck = self._roll(ids, control, begin, end, parts)
         torque = every["torque"].reshape(len(ids), end - begin, parts, every["torque"].shape[2])
         shown = {
@@ -108,33 +108,33 @@ class FineSteps:
         if parts < FINEST and (again := np.flatnonzero(struck < end)).size:
             self.engine.put(ids[again], before[again])
             finer = self._roll_finely(ids[again], control[again], begin, end, FINER * parts)
-            _show(shown, again, 0, finer)
+            _overwrite(shown, again, 0, finer)
         return shown
 
 
 def allowed_depth(compiled: CompiledBody) -> float:
-    """Allowed depth of a foot of a body in the ground [mm]."""
+    """Return the depth of a body's foot in the ground beyond which a step is repeated [mm]."""
     return SINK * compiled.conditions.standing_height
 
 
-def _show(shown: Shown, rows: np.ndarray, begin: int, instead: Shown) -> None:
-    """Replace the record of some rows, from a substep on."""
-    for name, values in instead.items():
+def _overwrite(shown: Shown, rows: np.ndarray, begin: int, new: Shown) -> None:
+    """Overwrite some rows of a record by a new record, from the substep `begin` on."""
+    for name, values in new.items():
         shown[name][rows, begin : begin + values.shape[1]] = values
 
 
 @jitted
 def strikes(depth: Any, substeps: int, allowed: float) -> Any:
-    """Physics steps in which a foot gets too deep, or will be too deep one step later, (n, step).
+    """Return whether a foot gets too deep in each physics step, or will be too deep one step later, (n, step).
 
-    The latter counts only at the end of a step of the plan: the next one could be repeated only from there on, when
-    the foot is already too deep and too fast.
+    The second condition is checked only in the last physics step of a step of the plan. Otherwise a foot that strikes
+    early in the next step would already be too deep and too fast where the repetition begins.
 
     Args:
-        depth: of the feet before the first and after each physics step, (n, 1 + step, leg) [mm]; negative above ground.
-            It begins where a step of the plan begins.
-        substeps: physics steps in one step of the plan.
-        allowed: allowed depth [mm].
+        depth: depth of the feet before the first and after each physics step, (n, 1 + step, leg) [mm]; negative above
+            ground. The first physics step is the first of a step of the plan.
+        substeps: number of physics steps in one step of the plan.
+        allowed: maximum depth without a strike [mm].
     """
     struck = np.zeros((depth.shape[0], depth.shape[1] - 1), dtype=np.bool_)
     for n in range(struck.shape[0]):
@@ -149,9 +149,9 @@ def strikes(depth: Any, substeps: int, allowed: float) -> Any:
 
 
 def in_whole_steps(sensors: np.ndarray, fine: int, forces: np.ndarray) -> np.ndarray:
-    """Sensors at the beginning of each step, (..., step, column), from those of its `fine` parts, (..., part, column).
+    """Return the sensors of whole steps, (..., step, column), from the sensors of their parts, (..., part, column).
 
-    The columns `forces` are means over the parts.
+    A step has `fine` parts. The columns `forces` are means over the parts; the others are those of the first part.
     """
     parts = sensors.reshape(*sensors.shape[:-2], -1, fine, sensors.shape[-1])
     whole = parts[..., 0, :].copy()
