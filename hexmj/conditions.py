@@ -14,7 +14,7 @@ from hexmj.timing import Stride
 from hexmj.validate import choice, number, whole
 
 GroundKind = Literal["flat", "step", "gap", "hurdle", "rough"]
-"""Kinds of ground, see `Conditions.ground`."""
+"""Kind of ground, see `Conditions.ground`."""
 
 GROUND_MEASURES: dict[GroundKind, tuple[str, ...]] = {
     "flat": (),
@@ -23,10 +23,10 @@ GROUND_MEASURES: dict[GroundKind, tuple[str, ...]] = {
     "hurdle": ("ground_height", "ground_at", "ground_length"),
     "rough": ("ground_height", "ground_at", "ground_seed"),
 }
-"""Kind of ground -> the conditions that describe it."""
+"""Kind of ground -> names of the conditions that describe this kind."""
 
 ROUNDING = 1e-9
-"""Relative tolerance with which physics steps fit into a step of the plan."""
+"""Relative tolerance in comparisons and divisions of durations."""
 
 
 @dataclass(frozen=True)
@@ -34,57 +34,58 @@ class Conditions:
     """The conditions of a physical walk, for example `Conditions(vp=20.0, load=1.0)`.
 
     Raises:
-        InputError: a value is out of the range that the body allows.
+        InputError: a value is outside of the range that the body allows.
     """
 
     vp: float = 80.0
     """Velocity V_p of a protracting tip relative to the body [mm/s]; the plan's time unit is 1 mm / V_p."""
 
     step_height: float = 12.0
-    """Height to which a swinging foot is lifted [mm]. It exceeds the trunk's clearance, so that a swinging foot does
-    not catch a falling body."""
+    """Height to which a swinging foot is lifted [mm]. The default exceeds the clearance of the trunk, so that a
+    swinging foot does not support a falling body."""
     standing_height: float = 10.0
-    """Height of the root above the standing tips [mm]."""
+    """Height of the root above the tips of standing legs [mm]."""
     lift_time: float = 20.0
-    """Time in which a foot is raised [ms]. With much shorter times standing feet hop."""
+    """Time in which a foot is raised after lift-off [ms]. Much shorter times make standing feet hop."""
     landing_time: float = 20.0
-    """Time in which a foot is lowered before it reaches its AEP [ms]. With shorter times it strikes the ground."""
+    """Time in which a foot is lowered, ending at its AEP [ms]. With shorter times the foot strikes the ground."""
 
     load: float = 0.0
-    """Weight carried at O, in multiples of the insect's own."""
+    """Weight of a load carried at O, in multiples of the insect's own weight."""
     centre_of_mass: float = 0.0
-    """Distance of the centre of mass, load included, ahead of O in the home posture [mm]. The animal's is at -9.4,
-    1.4 mm behind the hind coxae. The trunk's masses are moved, none is added."""
+    """Distance of the centre of mass, load included, ahead of O in posture home [mm]. In the animal it is -9.4 mm,
+    1.4 mm behind the hind coxae. Masses of the trunk are shifted; none is added."""
     leg_mass: float = 1.0
-    """Mass of the legs as a fraction of the insect's own; the trunk makes up for it. The paper's legs have none."""
+    """Mass of the legs in multiples of its default. The trunk's mass changes so that the total mass stays the same.
+    The paper's legs are massless."""
 
     friction: float = 1.0
-    """Coefficient of sliding friction between the ground and feet or trunk."""
+    """Coefficient of sliding friction of feet and trunk on the ground."""
     grasp: float = 0.0
-    """Adhesion of a standing foot, in multiples of the insect's weight. About 10 presses the stick insect's feet too
-    deep into the ground to settle."""
+    """Adhesion of a standing foot, in multiples of the insect's weight. From about 10 on, walks of the stick insect are
+    refused, since adhesion presses its feet too deep into the ground."""
 
     ground: GroundKind = "flat"
-    """Ground ahead: flat, a step up, a gap, a hurdle, or rough ground, whose bumps end on the plane."""
+    """Kind of ground ahead: flat, a step up, a gap, a hurdle, or rough (a field of bumps on flat ground)."""
     ground_height: float = 3.0
-    """Height of a step, a hurdle or the highest bump of rough ground [mm]; a gap is as deep as a leg is long."""
+    """Height of a step or hurdle, or maximum height of bumps [mm]. A gap is as deep as the shortest leg is long."""
     ground_at: float = 50.0
     """Distance from O at the start to the step, gap, hurdle or rough ground [mm]."""
     ground_length: float = 10.0
-    """Length of a gap or hurdle along the way [mm]."""
+    """Length of a gap or hurdle in the direction of walking [mm]."""
     ground_seed: int = 0
-    """Seed of the bumps of rough ground."""
+    """Seed of the random heights of the bumps of rough ground."""
 
     longest_substep: float = 0.625
-    """Longest physics step [ms]. A step of the plan is divided into the fewest whole substeps within it, and these
-    further while a foot strikes the ground."""
+    """Maximum physics step [ms]. Each step of the plan is divided into the fewest equal physics steps that are not
+    longer. While a foot strikes the ground, physics steps are shorter."""
     contact_gap: float = 10.0
-    """A foot that leaves the ground for at most this time still counts as standing [ms]; 0 counts every bounce."""
+    """Maximum time off the ground for which a foot still counts as standing [ms]; at 0 a bounce is a lift-off."""
     settling_time: float = 200.0
-    """Time for which the insect stands before it walks [ms]. Whether it has come to rest is checked."""
+    """Time for which the insect stands before it walks [ms]. An insect that is not at rest by then is an error."""
 
     body: Body = STICK_INSECT
-    """Body that walks; its lengths bound the other conditions."""
+    """Body that walks; its lengths limit the ranges of the other conditions."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.body, Body):
@@ -99,48 +100,48 @@ class Conditions:
             object.__setattr__(self, name, float(value))
 
     def settings(self) -> dict[str, Any]:
-        """Return the conditions as plain data, with the body's name."""
+        """Return the conditions as plain data by name; the name of the body stands for the body."""
         return self.values() | {"body": self.body.name}
 
     def values(self) -> dict[str, Any]:
-        """Return every condition but the body by name."""
+        """Return the values of all conditions except the body, by name."""
         return {field.name: getattr(self, field.name) for field in fields(Conditions) if field.name != "body"}
 
     def seconds(self, stride: Stride) -> float:
-        """Duration of one step of a plan [s]."""
+        """Return the duration of one step of a plan [s]."""
         return stride.dt / self.vp
 
     @property
     def landing_distance(self) -> float:
-        """Distance before its AEP at which a tip begins to be lowered [mm]."""
+        """Distance before the AEP at which the lowering of a swinging tip begins [mm]."""
         return self.vp * self.landing_time / 1000.0
 
     @property
     def highest_ground(self) -> float:
-        """Height of the highest ground [mm]."""
+        """Maximum height of the ground above z = 0 [mm]."""
         return 0.0 if self.ground in ("flat", "gap") else self.ground_height
 
     def substeps(self, stride: Stride) -> int:
-        """Physics steps in one step of a plan."""
+        """Return the number of physics steps in one step of a plan."""
         return math.ceil(1000.0 * self.seconds(stride) / self.longest_substep - ROUNDING)
 
     def timestep(self, stride: Stride) -> float:
-        """Physics step [s]."""
+        """Return the duration of one physics step [s]."""
         return self.seconds(stride) / self.substeps(stride)
 
 
 def unusual(settings: Mapping[str, Any]) -> list[str]:
-    """Names of the conditions that differ from the defaults, and of those that describe the ground.
+    """Return the names of the conditions that differ from their defaults or describe the kind of ground.
 
     Args:
-        settings: as of `Conditions.settings` or `Conditions.values`.
+        settings: conditions by name, from `Conditions.settings` or `Conditions.values`.
     """
     defaults, measures = Conditions().settings(), GROUND_MEASURES[settings.get("ground", "flat")]
     return [name for name, value in settings.items() if name in measures or value != defaults[name]]
 
 
 def check_ground(conditions: Conditions) -> None:
-    """Raise InputError if a measure of an obstacle is set that this kind of ground does not have."""
+    """Raise InputError if a condition that describes another kind of ground differs from its default."""
     measures, defaults = GROUND_MEASURES[conditions.ground], Conditions().values()
     for name in ("ground_height", "ground_at", "ground_length", "ground_seed"):
         if name not in measures and (value := getattr(conditions, name)) != defaults[name]:
@@ -148,7 +149,7 @@ def check_ground(conditions: Conditions) -> None:
 
 
 def ranges(body: Body, ground: GroundKind) -> dict[str, tuple[float, float, bool]]:
-    """Range of each condition for a body: the least value, the greatest, and whether it must be above the least."""
+    """Return the range of each condition for a body: minimum, maximum, and whether the minimum itself is excluded."""
     lengths = body.lengths
     heights = (
         (0.0, lengths.shortest_leg, True) if ground != "rough" else (lengths.lowest_bump, lengths.highest_bump, False)

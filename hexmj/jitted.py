@@ -10,23 +10,23 @@ from hexmj.version import __version__
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-njit: Any = numba.njit  # the types of numba lack some options
+njit: Any = numba.njit  # numba's type annotations lack some options
 
 part = njit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-"""A function that only compiled functions call; Python cannot. It compiles in half the time."""
+"""Decorator of a function that only compiled functions can call, not Python; it compiles in half the time."""
 
 inlined = njit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
-"""The same, inlined into each of its callers."""
+"""Decorator of a function that only compiled functions can call; it is inlined into each of its callers."""
 
 
 def jitted(function: Function) -> Function:
     """Compile a function with numba and cache it on disk.
 
-    numba discards cached code when the function's own file changes. Here it does so too when hexmj's version changes,
-    or the file of a compiled function that this one calls.
+    numba discards cached code when the file of the function changes. This decorator makes numba discard it also when
+    the version of hexmj changes, or the file of a compiled function that the function's module uses.
     """
     compiled: Any = njit(cache=True, nogil=True, no_cfunc_wrapper=True)(function)
-    if compiled is not function:  # as it is with NUMBA_DISABLE_JIT
+    if compiled is not function:  # with NUMBA_DISABLE_JIT numba returns the function itself
         cache_file = compiled._cache._cache_file
         stamps = sorted((file, Path(file).stat().st_mtime) for file in _files(function, set()))
         cache_file._source_stamp = (cache_file._source_stamp, __version__, *stamps)
@@ -34,7 +34,7 @@ def jitted(function: Function) -> Function:
 
 
 def _files(function: Callable[..., Any], found: set[str]) -> set[str]:
-    """Files of a function and of the compiled functions that its module uses."""
+    """Add to `found` the files of a function and of all compiled functions that its module uses; return `found`."""
     found.add(function.__code__.co_filename)
     for value in function.__globals__.values():
         inner = getattr(value, "py_func", None)

@@ -1,4 +1,4 @@
-"""Unit quaternions (w, x, y, z) of a root: vectors turned, its heading, and how far it leans."""
+"""Functions of a root's unit quaternion (w, x, y, z): rotated vectors, heading, tilt and lowest point."""
 
 from typing import Any
 
@@ -8,26 +8,26 @@ from hexmj.jitted import inlined, part
 
 
 def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Vectors, (..., 3), turned by unit quaternions, (..., 4)."""
+    """Return vectors, (..., 3), rotated by unit quaternions, (..., 4)."""
     w, axis = quaternion[..., :1], quaternion[..., 1:]
     return vector + 2.0 * np.cross(axis, np.cross(axis, vector) + w * vector)
 
 
 def heading(quaternion: np.ndarray) -> np.ndarray:
-    """Direction in which the root points, (...) [rad], counter-clockwise from the world's x axis."""
+    """Return the direction in which the root points, (...) [rad], counter-clockwise from the world's x axis."""
     w, x, y, z = np.moveaxis(quaternion, -1, 0)
     return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
 def turned(points: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Points on the plane, (..., point, 2), turned counter-clockwise by angles, (...) [rad]."""
+    """Return points on the plane, (..., point, 2), rotated counter-clockwise by angles, (...) [rad]."""
     cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
     ahead, left = points[..., 0], points[..., 1]
     return np.stack([cos * ahead - sin * left, sin * ahead + cos * left], axis=-1)
 
 
 def lean(quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far a root's axes ahead and to the left dip below the level, (..., 2) [sine], and its tilt, (...) [rad]."""
+    """Return how far a root's forward and left axes point below the horizontal, (..., 2) [sine], and its tilt [rad]."""
     w, x, y, z = np.moveaxis(quaternion, -1, 0)
     leans = np.stack([2.0 * (w * y - x * z), -2.0 * (w * x + y * z)], axis=-1)
     return leans, np.arctan2(np.linalg.norm(leans, axis=-1), 1.0 - 2.0 * (x * x + y * y))
@@ -35,12 +35,12 @@ def lean(quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @part
 def lowest(qpos: Any, corners: Any, radii: Any) -> float:
-    """Height of the lowest of some spheres that a root carries, for compiled code [mm].
+    """Return the height of the lowest point of spheres that are fixed to a root [mm], for compiled code.
 
     Args:
-        qpos: place and quaternion of the root, and more, (position,).
-        corners: their middles in the root frame, (corner, axis) [mm].
-        radii: of each, (corner,) [mm].
+        qpos: position and quaternion of the root; further elements are ignored, (position,).
+        corners: centres of the spheres in the root frame, (corner, axis) [mm].
+        radii: radii of the spheres, (corner,) [mm].
     """
     _, _, _, _, _, _, up_x, up_y, up_z = matrix(qpos[3], qpos[4], qpos[5], qpos[6])
     least = np.inf
@@ -52,7 +52,7 @@ def lowest(qpos: Any, corners: Any, radii: Any) -> float:
 
 @inlined
 def matrix(w: float, x: float, y: float, z: float) -> Any:
-    """The rotation of one quaternion, row by row: nine numbers, for compiled code."""
+    """Return the rotation matrix of a unit quaternion as nine numbers, row by row, for compiled code."""
     return (
         1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
         2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),

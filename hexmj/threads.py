@@ -1,4 +1,4 @@
-"""Cores and memory of this machine, and blocks of starts computed on a pool of threads that release the GIL."""
+"""Cores and memory of this machine, and a pool of threads that computes blocks of starts in parallel."""
 
 import os
 import sys
@@ -10,7 +10,7 @@ from hexmj.validate import whole
 
 
 def cores() -> int:
-    """Number of cores that this process may use."""
+    """Return the number of cores that this process may use."""
     if sys.version_info >= (3, 13):
         return os.process_cpu_count() or 1
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
@@ -22,14 +22,14 @@ def thread_count(threads: int | None = None) -> int:
 
 
 def check_memory(what: str, needed: float) -> None:
-    """Raise InputError if something needs more memory [bytes] than this machine has."""
+    """Raise InputError if this machine has less than the needed memory [bytes]; the message begins with `what`."""
     available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else float("inf")
     if needed > available:
         raise InputError(f"{what} need {needed / 1e9:.3g} GB of memory; this machine has {available / 1e9:.3g} GB")
 
 
 def run_blocks(work: Callable[[int, int], None], size: int, block: int, threads: int | None = None) -> None:
-    """Call `work(begin, end)` for consecutive blocks of range(size); results must not depend on the order."""
+    """Call `work(begin, end)` on threads for blocks of range(size), each of length `block`, in any order."""
     count = thread_count(threads)
     begins = range(0, size, block)
     ends = [min(begin + block, size) for begin in begins]
@@ -37,4 +37,4 @@ def run_blocks(work: Callable[[int, int], None], size: int, block: int, threads:
         list(map(work, begins, ends))
         return
     with ThreadPoolExecutor(count) as pool:
-        list(pool.map(work, begins, ends))  # cancels the others after an error
+        list(pool.map(work, begins, ends))  # an error cancels the blocks that wait
