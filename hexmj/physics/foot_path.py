@@ -171,7 +171,7 @@ def check_made_for(plan: Plan, conditions: Conditions) -> None:
 
 
 def hold(joints: np.ndarray, last: np.ndarray) -> None:
-    """Replace NaN in `joints`, (substep, leg, joint), by the angles one substep before; `last` is before the first."""
+    """Replace NaN in `joints`, (substep, leg, joint), by those one substep before; `last` precedes the first."""
     for angles in joints:
         missing = np.isnan(angles)
         angles[missing] = last[missing]
