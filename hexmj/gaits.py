@@ -84,7 +84,7 @@ def gait(walk: Walk) -> Gait:
         InputError: the walk has fewer than two steps, or no starts.
     """
     if len(walk.time) < 2:
-        raise InputError(f"a walk of {len(walk.time)} steps; expected at least {CYCLES} periods of every leg")
+        raise InputError(f"the walk has {len(walk.time)} steps; expected at least {CYCLES} periods of every leg")
     if not walk.stance.shape[1]:
         raise InputError("the walk has 0 starts; expected at least 1")
 

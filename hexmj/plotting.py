@@ -56,7 +56,7 @@ SERIES: tuple[dict[str, Any], ...] = (
     {"color": "#b3261e", "marker": "D", "linestyle": ":"},
     {"color": "#6a4c93", "marker": "v", "linestyle": (0, (5, 1))},
 )
-"""Styles of curves that show no measure, used in this order."""
+"""Styles, in this order, of curves for something else than a measure of stability: a strategy, or a velocity."""
 
 VELOCITY = "velocity $V_r / V_p$"
 """Label of a velocity axis."""

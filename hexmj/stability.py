@@ -48,9 +48,9 @@ def _checked(feet: ArrayLike, stance: ArrayLike) -> tuple[np.ndarray, np.ndarray
     """Return feet, (..., leg, 2), and stance, (..., leg), if their shapes fit and all standing feet are finite."""
     tips, stands = numbers("feet", feet), states("stance", stance)
     if tips.shape != (*stands.shape, 2):
-        raise InputError(f"feet {tips.shape} and stance {stands.shape}; expected (..., leg, 2) and (..., leg)")
+        raise InputError(f"shapes: feet {tips.shape}, stance {stands.shape}; expected (..., leg, 2) and (..., leg)")
     if not np.isfinite(tips[stands]).all():
-        raise InputError("feet: a standing foot is at NaN or infinity")
+        raise InputError("feet: the position of a standing foot is NaN or infinite")
     return tips, stands
 
 
@@ -99,7 +99,7 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
     """
     tips, stands = _checked(feet, stance)
     if stands.ndim != 1:
-        raise InputError(f"stance has the shape {stands.shape}; expected (leg,)")
+        raise InputError(f"stance has the shape {stands.shape}; expected (6,)")
     points = tips[stands]
     if len(points) < 3:
         return points

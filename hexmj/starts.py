@@ -75,7 +75,7 @@ def checked_velocities(velocity: ArrayLike, n_starts: int, acceleration: Acceler
     if not ((v >= 0) & (v < 1)).all():
         raise InputError(f"velocity = {short(v.tolist())}; expected 0 <= V < 1, a fraction of V_p")
     if acceleration and not (v >= acceleration.start).all():
-        raise InputError(f"velocity = {velocity}; expected at least V_r(0) = {acceleration.start} when accelerating")
+        raise InputError(f"velocity = {velocity}; expected at least {acceleration.start}, where acceleration starts")
     if v.shape not in ((), (n_starts,)):
         raise InputError(f"velocity has the shape {v.shape}; expected one number or one for each of {n_starts} starts")
     return np.broadcast_to(v, n_starts).copy()

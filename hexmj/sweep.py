@@ -1,8 +1,8 @@
 """Sweeps: many cells, each a pure function of its settings, computed on any executor and cached in a folder.
 
-The cache key of a cell is a digest of its function and settings, of hexmj's sources, of the source files of the user's
-classes in the settings and the `.py` files beside them, and of the versions of the packages that compute. Other files
-that a controller reads are not part of the key, unless a field of its dataclass names them.
+The cache key of a cell is a digest of its function and settings, of hexmj's sources and of the versions of the packages
+that compute. If the settings hold classes of the user, it also covers their source files and the `.py` files beside
+them. It covers other files that a controller reads only if a field of the controller's dataclass names them.
 """
 
 import json
@@ -59,7 +59,7 @@ class Cell:
         return self.function(*first, **self.settings, **{k: v for k, v in execution.items() if k in accepted})
 
     def record(self) -> str:
-        """Return the cache key as JSON: the function, its settings, the sources and the versions.
+        """Return the content of the cache key as JSON: the function, its settings, the sources and the versions.
 
         Raises:
             InputError: a setting cannot be written as JSON.
@@ -75,7 +75,7 @@ class Cell:
         return json.dumps(record, sort_keys=True)
 
     def stem(self, record: str) -> str:
-        """Return the name of the cell's file without suffix: the cell's name and a digest of its cache key `record`."""
+        """Return the name of the cell's file without suffix: its name and its cache key, a digest of `record`."""
         readable = re.sub(r"[^A-Za-z0-9.+-]+", "-", self.name)[:100].lstrip(".-")
         return f"{readable}-{digest(record.encode())}"
 

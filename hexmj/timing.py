@@ -80,18 +80,18 @@ class Acceleration:
 
 
 def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Acceleration | None) -> None:
-    """Raise InputError if a V_r plus its growth in one time step (Eq. 11) is 1 or more."""
+    """Raise InputError if a V_r, plus what Eq. 11 adds to it in one time step, is 1 or more."""
     if acceleration and not (velocity + acceleration.rate * stride.dt < 1.0).all():
         step = acceleration.rate * stride.dt
-        raise InputError(f"V = {velocity.max():g} grows by {step:g} in a time step; expected a sum below 1")
+        raise InputError(f"V = {velocity.max():g}, to which one time step adds {step:g}; expected a sum below 1")
 
 
 def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acceleration | None) -> None:
     """Raise InputError if Eq. 11 does not reach a V_r, (velocity,), within its duration, (velocity,) [time units]."""
     if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity) * (1.0 - 1e-9))).size:
         v, end = velocity[late[0]], duration[late[0]]
-        reached = f"V = {v:g} is reached at {acceleration.duration(v):g} time units"
-        raise InputError(f"{reached}; expected an observation time longer than {end:g}, or 'walk' or 'start'")
+        late_by = f"V = {v:g} is reached after {acceleration.duration(v):g} time units, but the walk ends after {end:g}"
+        raise InputError(f"{late_by}; expected a longer observation time, or 'walk' or 'start'")
 
 
 def observation_duration(

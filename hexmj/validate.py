@@ -60,7 +60,7 @@ def states(name: str, values: ArrayLike) -> np.ndarray:
     array = np.asarray(values)
     if array.dtype.kind == "b" or (array.dtype.kind in "iu" and np.isin(array, (0, 1)).all()):
         return np.array(array, dtype=bool, order="C")
-    raise InputError(f"{name} = {short(values)}; expected True and False")
+    raise InputError(f"{name} = {short(values)}; expected only True or False")
 
 
 def short(value: Any) -> str:

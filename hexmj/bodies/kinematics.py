@@ -1,14 +1,14 @@
 """Kinematics of the legs: from tips to joint angles and back, in closed form or numerically.
 
-Closed form (`ThreeHinges`): legs of three hinges whose segments lie in one vertical plane, which the first hinge turns.
-The angles are those of biology, with equal signs on both sides: protraction (0 across the body axis, positive forward),
-levation of the second segment (0 horizontal, positive up) and the inner angle of the knee (pi is straight). The knee
-always points up, so the angles are unique.
+Closed form (`ThreeHinges`): for legs of three hinges. Their segments lie in one vertical plane; the first hinge turns
+this plane. The angles are those of biology, with equal signs on both sides: protraction (0 across the body axis,
+positive forward), levation of the second segment (0 horizontal, positive up) and the inner angle of the knee (pi if
+straight). The knee always points up, so the angles are unique.
 
-Numeric (`HingeChains`): any chain of hinges, solved by `newton`. With more than three hinges many postures reach a tip;
-the posture nearest to home is chosen. A tip of the stick insect takes 1.8 microseconds on one core, instead of 0.05 in
-closed form. Nearly singular chains can fail to reach a tip that is within reach: at most 3 in 1000 random postures of
-random chains, and none of 10^5 of the stick insect.
+Numeric (`HingeChains`): for any chain of hinges, solved by `newton`. If several postures reach a tip, it returns the
+posture nearest to home. It takes 1.8 microseconds for a tip of the stick insect on one core; the closed form, 0.05. For
+a nearly singular chain it can miss a tip within reach: at most 3 in 1000 random postures of random chains, and none in
+10^5 of the stick insect.
 """
 
 import math

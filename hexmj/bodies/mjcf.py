@@ -106,13 +106,12 @@ def check_home(compiled: CompiledBody) -> None:
         leg = int(np.argmax(off))
         raise InputError(
             f"body {body.name!r}: in posture {body.home!r} foot {body.feet[leg]!r} is at {tips[leg].round(3).tolist()}"
-            f" mm; expected {expected[leg].tolist()}, the origin of its line at the standing height below the root"
+            f"; expected {expected[leg].tolist()} mm: the origin of the foot's line, one standing height below the root"
         )
     ahead, left, _ = _centre_of_mass(plain_model(body), body)
     where = f"body {body.name!r}: in posture {body.home!r} the centre of mass is"
     if compiled.conditions.centre_of_mass == 0.0 and abs(ahead) > tolerance:
-        remedy = f"use Conditions(centre_of_mass={ahead:.4g}) to leave it there"
-        raise InputError(f"{where} {ahead:.4g} mm ahead of O; expected 0. Or {remedy}.")
+        raise InputError(f"{where} {ahead:.4g} mm ahead of O; expected 0, or Conditions(centre_of_mass={ahead:.4g})")
     if abs(left) > tolerance:
         raise InputError(f"{where} {left:.4g} mm left of O; expected 0")
 
@@ -198,9 +197,7 @@ def _redistribute(model: mujoco.MjModel, conditions: Conditions) -> None:
     in_legs, in_trunk = model.body_mass[legs].sum(), model.body_mass[trunk].sum()
     if not in_legs * conditions.leg_mass < in_legs + in_trunk:
         most = 1.0 + in_trunk / in_legs
-        raise InputError(
-            f"leg_mass = {conditions.leg_mass:g}; expected below {most:.4g}: the trunk of {body.name!r} needs mass"
-        )
+        raise InputError(f"leg_mass = {conditions.leg_mass:g} leaves the trunk no mass; expected below {most:.4g}")
     for parts, factor in (
         (legs, conditions.leg_mass),
         (trunk, 1.0 + in_legs / in_trunk * (1.0 - conditions.leg_mass)),

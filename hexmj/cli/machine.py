@@ -91,7 +91,7 @@ def threads() -> str:
     quota = Path("/sys/fs/cgroup/cpu.max")
     share, period = quota.read_text().split() if quota.is_file() else ("max", "1")
     if share != "max" and int(share) < cores() * int(period):
-        raise RuntimeError(f"{cores()} threads for a quota of {int(share) / int(period):g} cores")
+        raise RuntimeError(f"{cores()} threads, but the container's quota is {int(share) / int(period):g} cores")
     return f"{cores()} threads, one for each core that this process may use (of {os.cpu_count()})"
 
 
@@ -137,9 +137,9 @@ def walking() -> str:
 
     single, several = (physical_walk(draw_starts(2, 0), LDVS, 0.1, 20.0, threads=n) for n in (1, None))
     if np.isfinite(single.outcomes.fall).any():
-        raise RuntimeError("an insect fell in a walk that has no fall on other machines")
+        raise RuntimeError("an insect fell in a walk in which no insect falls on other machines")
     if not np.array_equal(single.qpos, several.qpos):
-        raise RuntimeError("walks on one thread and on several differ")
+        raise RuntimeError("the same walk differs between one thread and several threads")
     return "two insects walked for 20 time units, with the same bits on one thread and on all"
 
 

@@ -130,7 +130,7 @@ class Page(Command):
         from hexmj.replay.recording import load_recording, recording_summary
 
         if not 1 <= len(given.recordings) <= 2:
-            raise InputError(f"{len(given.recordings)} recordings; expected 1 or 2, such as recording.nc of hexmj walk")
+            raise InputError(f"{len(given.recordings)} recordings; expected 1 or 2, as `hexmj walk` writes them")
         shown = [load_recording(path) for path in given.recordings]
         file = page(shown, results_folder(given.out) / "walk.html")
         settings = {"recordings": [str(path) for path in given.recordings]}

@@ -108,7 +108,7 @@ def _steps(trial: Trial) -> None:
     _check_equal("velocity after the walk", velocity, trial.velocity)
     _check_equal("the plan's starts after the walk", plan.starts, trial.starts)
     if (now := settings_of(trial.controller)) != settings:
-        raise InputError(f"planning changes the controller's settings to {now}; expected {settings}")
+        raise InputError(f"planning changes the controller's settings to {now}; expected unchanged {settings}")
 
 
 def _times(trial: Trial) -> None:

@@ -61,7 +61,7 @@ def begin(
         raise Refused(*error.args) from error
     check_plan(plan, x, stride)
     if at_speed and not isinstance(plan, SteerablePlan):
-        raise InputError(f"begin_at_speed of {controller.name} returned {short(plan)}; expected a steerable plan")
+        raise InputError(f"begin_at_speed of {controller.name} returned {short(plan)}; expected a SteerablePlan")
     return plan
 
 
@@ -83,7 +83,7 @@ def check_plan(plan: Plan, starts: np.ndarray, stride: Stride) -> None:
     if not isinstance(plan, Plan):
         raise InputError(f"begin returned {short(plan)}; expected a plan with starts, stride, done and advance")
     if plan.done != 0 or plan.stride != stride:
-        raise InputError(f"the plan is at step {plan.done} with {plan.stride}; expected step 0 with {stride}")
+        raise InputError(f"begin returned a plan at step {plan.done} with {plan.stride}; expected step 0 with {stride}")
     if not np.array_equal(plan.starts, starts):
         raise InputError(f"the plan's starts, {np.shape(plan.starts)}, differ from the given starts, {starts.shape}")
 
@@ -99,15 +99,15 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
     before = plan.done
     walk = copied(plan.advance(steps))
     if (shape := walk.stance.shape) != (steps, starts, len(LEGS)) or plan.done != before + steps:
-        raise InputError(f"advance({steps}) at step {before} returned {shape} and ended at step {plan.done}")
+        raise InputError(f"advance({steps}) at step {before} returned the shape {shape} and ended at step {plan.done}")
     for name in ("time", "velocity", "x", "y", "aep", "height"):
         values = getattr(walk, name)
         bad = np.isinf(values) if name in ("aep", "height") else ~np.isfinite(values)
         if bad.any():
             at = np.argwhere(bad)[0]
-            raise InputError(f"{name} of the plan is {values[tuple(at)]} in {place(walk, at, before)}")
+            raise InputError(f"{name} is {values[tuple(at)]} in {place(walk, at, before)}; expected a finite number")
     if walk.geometry != plan.stride.geometry:
-        raise InputError(f"geometry of the plan is {walk.geometry}; expected {plan.stride.geometry}")
+        raise InputError(f"the plan's geometry is {walk.geometry}; expected {plan.stride.geometry}")
     return walk
 
 

@@ -168,9 +168,7 @@ def check_steerable(controller: Controller) -> None:
 def check_controller_type(controller: object) -> None:
     """Raise InputError unless the object is a controller: a frozen dataclass with a name and a method `begin`."""
     if isinstance(controller, type) or not (is_dataclass(controller) and isinstance(controller, Controller)):
-        raise InputError(
-            f"controller = {short(controller)}; expected a controller, such as hexmj.LDVS or load_controller(name)"
-        )
+        raise InputError(f"controller = {short(controller)}; expected one such as hexmj.LDVS or load_controller(name)")
 
 
 def settings_of(controller: Controller) -> dict[str, Any]:

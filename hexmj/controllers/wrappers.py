@@ -134,7 +134,7 @@ class PoorSenses(Wrapper):
         if self.delay and not late:
             raise InputError(f"delay = {self.delay:g}; expected 0 or at least one step of {stride.dt:g} time units")
         if not isinstance(plan, FeedbackPlan):
-            raise InputError(f"{self.controller.name} has no senses; expected a controller with sensory feedback")
+            raise InputError(f"{self.controller.name} has no sensory feedback, which noise or a delay could affect")
         return PoorlySensedPlan(plan, self.noise * (stride.aep0 - stride.pep0), late)
 
 

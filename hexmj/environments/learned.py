@@ -121,9 +121,7 @@ class OffsetPlan(WrappedPlan):
         seen = np.where(self._sensed, self._felt, self._upright(step.velocity[0]))
         actions = np.asarray(self._policy(seen), dtype=float)
         if actions.shape != (count, 18) or np.isnan(actions).any():
-            raise InputError(
-                f"the policy returned NaN or the shape {actions.shape}; expected numbers of shape {(count, 18)}"
-            )
+            raise InputError(f"the policy returned NaN or the shape {actions.shape}; expected {(count, 18)} numbers")
         offset = np.clip(actions, -1.0, 1.0).reshape(count, 6, 3)
         offset = self.made_for.body.lengths.largest_tip_offset * offset
         self._tips, self._stance = self._targets.follow(step, np.arange(count))[:, -1], step.stance[0].astype(float)

@@ -159,7 +159,7 @@ def checked_actions(
     if actions.shape != shape:
         raise InputError(f"the action has the shape {actions.shape}; expected {shape}")
     if not (within := (actions >= low - ROUNDING) & (actions <= high + ROUNDING)).all():
-        raise InputError(f"the action has {actions[~within][0]}, which is out of the action space")
+        raise InputError(f"the action has {actions[~within][0]}; expected values within the action space")
     return actions
 
 

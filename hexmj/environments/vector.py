@@ -82,7 +82,7 @@ class StickInsects(Insects, VectorEnv[Observations, np.ndarray, np.ndarray]):
         if which.shape != (self.num_envs,) or which.dtype != bool or not which.any():
             raise InputError(f"reset_mask = {which!r:.80}; expected {self.num_envs} booleans, at least one True")
         if not (self._walkers.begun or which.all()):
-            raise InputError("reset_mask leaves out insects; a first reset, or one after an error, must include all")
+            raise InputError("reset_mask leaves out insects; the first reset, and one after an error, must include all")
         seeds: Any = [None] * self.num_envs if seed is None else seed
         if isinstance(seeds, Integral):
             seeds = [seeds + i for i in range(self.num_envs)]

@@ -143,7 +143,7 @@ class Walkers:
     def check_begun(self) -> None:
         """Raise InputError unless all insects have begun and no step or reset has failed since."""
         if not self.begun:
-            raise InputError("no episode has begun, or a step or a reset failed; reset all insects first")
+            raise InputError("no episode is running, or a step or a reset failed; reset all insects first")
 
     @property
     def over(self) -> bool:

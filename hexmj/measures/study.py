@@ -144,9 +144,10 @@ def standing_starts(
 def by_halves(
     which: np.ndarray, walk: Callable[[np.ndarray], Any], diverging: bool = False
 ) -> Iterator[tuple[np.ndarray, Any]]:
-    """Walk starts, halve them wherever walks fail, and yield the indices of each part that succeeds with its outcomes.
+    """Walk the starts together; if that fails, walk each half separately, and so on. Leave out single starts that fail.
 
-    A walk fails if its start cannot stand, its foot targets are out of reach or a push still acts at its end.
+    Yield the indices and outcomes of each part that succeeds. A walk fails if its start cannot stand, its targets are
+    out of reach or a push still acts at its end.
 
     Args:
         which: indices of the starts, (n,).

@@ -144,7 +144,7 @@ class Reproduction:
 
 @dataclass(frozen=True)
 class Measurement:
-    """A function that measures at one velocity, with its settings and velocities."""
+    """A function that measures at one velocity, its further arguments, and the velocities at which it is called."""
 
     function: Callable[..., Any]
     """Function: `losses` (Figs. 2-4), `limit_regimes` (Figs. 5, 6), `footfalls` or `losses_after` (Section 6)."""

@@ -21,7 +21,7 @@ def steps_pushed(conditions: Conditions, stride: Stride) -> int:
     """
     if not can_push(conditions, stride):
         duration, longest = 1e3 * conditions.seconds(stride), 2e3 * PUSH_LASTS
-        raise InputError(f"a step of the plan lasts {duration:g} ms; expected less than {longest:g} ms for a push")
+        raise InputError(f"a push needs steps of the plan shorter than {longest:g} ms; these last {duration:g} ms")
     return round(PUSH_LASTS / conditions.seconds(stride))
 
 
@@ -59,4 +59,4 @@ class Push:
         outside = pushed & ((self.time < 0.0) | (self.begins(stride) + lasts > steps))
         if outside.any():
             start, last = int(np.argmax(outside)), (steps - lasts) * stride.dt
-            raise InputError(f"push: time = {self.time[start]:g} of start {start}; expected 0 to {last:g} time units")
+            raise InputError(f"push: time of start {start} = {self.time[start]:g}; expected 0 to {last:g} time units")

@@ -33,7 +33,7 @@ BRAKED = 0.5
 
 @dataclass(frozen=True, eq=False)
 class FineSteps:
-    """Takes whole steps of a plan, and repeats steps in which a foot strikes the ground with shorter physics steps."""
+    """Takes whole steps of a plan; if a foot strikes the ground in a step, repeats it with shorter physics steps."""
 
     engine: Engine
     """Engine that steps the bodies."""

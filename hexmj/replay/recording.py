@@ -170,7 +170,7 @@ def record_plan(
     planned = one_start(plan, start)
     steps = len(plan.time)
     if steps == 0 or not np.allclose(plan.time, np.arange(1, steps + 1) * stride.dt, 1e-9, 0.0):
-        raise InputError(f"plan: {steps} steps do not begin at time 0; expected all multiples of {stride.dt}")
+        raise InputError(f"plan: its {steps} times are wrong; expected {stride.dt:g}, {2 * stride.dt:g}, ...")
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)
     root = np.zeros((steps, ROOT_QPOS))

@@ -94,7 +94,7 @@ class FieldsForm:
             vector = FieldsForm(controller).begin
             if plain(controller) | {"name": ""} == plain(self.controller(vector)) | {"name": ""}:
                 return vector
-        raise InputError(f"begin = {controller.name}; expected {self.usual.name} with any {', '.join(self.names)}")
+        raise InputError(f"begin = {controller.name}; expected {self.usual.name} with other {', '.join(self.names)}")
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class NetworkForm:
             InputError: the controller is not a 1998 network, or its weights do not have this form.
         """
         if type(controller) is not Cruse1998:
-            raise InputError(f"begin = {controller.name}; expected a 1998 network, which this form needs")
+            raise InputError(f"begin = {controller.name}; expected a 1998 network, which the form {self.name} needs")
         vector, weights = self.parameters(controller.weights), general(controller.weights).to_vector()
         if np.isnan(vector).any() or not np.array_equal(general(self._weights(vector)).to_vector(), weights):
             raise InputError(f"begin = {controller.name}; expected weights of the form {self.name}")
@@ -191,7 +191,7 @@ def named_form(
         network = begin if type(begin) is Cruse1998 else Cruse1998(Symmetric())
         return NetworkForm(name, order or network.order, model_variant or network.model_variant)
     if order or model_variant:
-        raise InputError(f"order and model_variant need one of the forms {', '.join(FORMS)}; form = {name}")
+        raise InputError(f"form = {name} has no order and no model_variant; only these forms do: {', '.join(FORMS)}")
     try:
         return FieldsForm(load_controller(name), name)
     except InputError as error:

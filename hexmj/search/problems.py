@@ -187,7 +187,7 @@ class Sample:
         return (lost + np.mean(1.0 - np.minimum(times / ends, 1.0)).item()) / (self.n_starts + 1)
 
     def lost(self, cost: float) -> int | None:
-        """Return the number of lost or fallen starts from which a cost results; None for a mean over variants."""
+        """Return how many starts were lost, or fell, given a candidate's cost; None if it is a mean over variants."""
         if self.problem.over == "mean":
             return None
         if self.problem.ties == "equal":

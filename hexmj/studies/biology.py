@@ -181,7 +181,7 @@ class Biology(Study):
     def __post_init__(self) -> None:
         whole("periods", self.periods, MEASURED + 1, 1000)
         if not max(SPEEDS) < self.conditions.vp:
-            raise InputError(f"vp = {self.conditions.vp}; expected more than the fastest walk, {max(SPEEDS):g} mm/s")
+            raise InputError(f"vp = {self.conditions.vp}; expected above {max(SPEEDS):g} mm/s, the fastest walk")
         super().__post_init__()
 
     @property

@@ -81,7 +81,7 @@ class DisturbedWalks(Study):
         (v, time), slows = self.observed, "slow_down" in self.strategies
         low = self.initial_velocity if slows else 0.0
         if not ((v > 0) & (v >= low)).all():
-            raise InputError(f"velocities = {v.tolist()}; expected above 0 and at least the initial velocity, {low:g}")
+            raise InputError(f"velocities = {v.tolist()}; expected above 0 and at least {low:g}, the initial velocity")
         if slows:
             check_reached(v, self.stride, self.back)
             steps_within(time + self.back.duration(v), self.stride)

@@ -49,7 +49,7 @@ class Disturbance:
     step: np.ndarray
     """(start,) number of steps of the plan before the disturbance."""
     leg: np.ndarray
-    """(start,) index of the leg that kind 'leg' stops; if it stands, the leg with the next index that swings."""
+    """(start,) index of the leg that kind 'leg' stops; if it stands, the next swinging leg in order is stopped."""
 
     def awaited(self, standing: np.ndarray) -> np.ndarray:
         """Return whether each start must wait for a swinging leg, (start,), given which legs stand, (start, leg)."""
@@ -89,7 +89,7 @@ def collect_postures(controller: Controller, velocity: float, seed: int, stride:
     gait = steady_state_gait(controller, velocity, n_starts=CANDIDATES, seed=seed, stride=stride)
     stable = gait.periodic & gait.stable
     if not stable.any():
-        raise InputError(f"strategy 'reorganise': {controller.name} reaches no stable steady gait at V = {velocity:g}")
+        raise InputError(f"strategy 'reorganise': {controller.name} has no stable steady gait at V = {velocity:g}")
     start = int(np.argmax(stable))
     plan = begin(controller, draw_starts(CANDIDATES, seed, stride)[start : start + 1], velocity, stride)
     plan.advance(round(gait.reached[start] / stride.dt))
@@ -159,7 +159,7 @@ class Disturbed:
 
 
 class DisturbedPlan(WrappedPlan):
-    """A plan with a disturbance, a `protocol.SteerablePlan` that a `Disturbed` controller begins."""
+    """The plan that a `Disturbed` controller begins: a `protocol.SteerablePlan` with a disturbance."""
 
     def __init__(self, controller: Disturbed, plan: SteerablePlan) -> None:
         """Wrap a plan that is at time 0."""

@@ -1,10 +1,15 @@
 """Why an insect falls, or does not fall although its plan loses static stability: one named mechanism for every start.
 
 The time constant T = sqrt(h / g) is that of an inverted pendulum of the standing height h. A planned loss begins when
-the plan's margin around the body's own centre of mass is no longer positive. It ends when the plan is stable again, the
-centre of mass is above the polygon of the measured feet, and the trunk has tilted by less than `TIPPED` for a time T. A
-fall begins at the end of the last time T in which the trunk tilted by less than `TIPPED`. Its mechanism follows from
-the lean of the trunk from 2 T before its begin on, and from the plan's minimum margin from T before until its begin.
+the plan's margin around the body's own centre of mass is no longer positive. It ends when all of these are true:
+
+- the plan is stable again;
+- the centre of mass is above the polygon of the measured feet;
+- the trunk has stayed below a tilt of `TIPPED` for a time T.
+
+A fall begins when the trunk last had stayed below a tilt of `TIPPED` for a time T. Two things decide its mechanism: how
+the trunk leaned from 2 T before this beginning until the fall, and the plan's smallest margin in the time T before the
+beginning.
 """
 
 from collections.abc import Iterator

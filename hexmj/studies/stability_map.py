@@ -139,12 +139,13 @@ class StabilityMap(Study):
             of `Outcomes`. Over value: `stand`, the number of starts that stand and reach the targets at each velocity.
 
         Raises:
-            InputError: no start stands and reaches its foot targets in every cell.
+            InputError: no start stands and reaches nine of ten foot targets in every cell.
         """
         sizes, axis = {"value": len(self.chosen), "velocity": len(self.velocities)}, CONDITIONS[self.over]
         table = over_axes(sizes, data, join="inner", combine_attrs="override")
         if not table.sizes["start"]:
-            raise InputError(f"{self.over} = {self.chosen}; no start stands and reaches its foot targets at all values")
+            at = f"{self.over} = {self.chosen}"
+            raise InputError(f"{at}: no start stands and reaches nine of ten foot targets at every value and velocity")
         left, columns = [set(cell.start.values.tolist()) for cell in data], sizes["velocity"]
         stand = [len(set.intersection(*left[i : i + columns])) for i in range(0, len(left), columns)]
         default = Conditions().values()[self.over]
@@ -182,8 +183,8 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
 
     parts = [part for block in blocks for part in by_halves(block, fate)]
     if not parts:
-        value = walks.conditions.values()[over]
-        raise InputError(f"{over} = {value:g}; no start stands and reaches its foot targets at V = {walks.velocity:g}")
+        where = f"{over} = {walks.conditions.values()[over]:g}"
+        raise InputError(f"{where}: no start stands and reaches nine of ten foot targets at V = {walks.velocity:g}")
     columns = {name: np.concatenate([part[name] for _, part in parts]) for name in parts[0][1]}
     within = np.concatenate([which for which, _ in parts])
     return over_start(columns, UNITS | {"static_loss": "time unit", "direction": "rad"}).assign_coords(

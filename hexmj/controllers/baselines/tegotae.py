@@ -33,9 +33,9 @@ class Tegotae(Lifted):
     """Six phase oscillators with load feedback, Eq. 1."""
 
     own: float = 0.5
-    """sigma_1 W / (6 omega): feedback of a leg's own load, W / 6, relative to omega; W is the weight; chosen by us."""
+    """sigma_1 W / (6 omega), chosen by us: feedback of a leg's own load, W / 6 (W: weight), as a share of omega."""
     neighbours: float = 0.5
-    """sigma_2 W / (6 omega): feedback of neighbours that each carry W / 6, relative to omega; chosen by us."""
+    """sigma_2 W / (6 omega), chosen by us: feedback of neighbours that each carry W / 6, as a share of omega."""
     name: str = "tegotae"
 
     reads_load = True

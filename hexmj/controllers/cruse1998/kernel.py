@@ -57,7 +57,7 @@ def _influence(d, x, s, s_old, aep, v, p, k, rules):
     contra1 = 0.0 if s[contra] == 1.0 else -p[_P1_CONTRA + d]
     pep = (rear1 if abs(rear1) > abs(contra1) else contra1) if len(rules[_STRONGEST]) else rear1 + contra1
     pep += p[_P2_REAR + d] if (s[rear] == 1.0) & (s_old[rear] == 0.0) else 0.0  # Eq. 3
-    behind = p[_P31_FRONT + d] + p[_P34_FRONT + d] * v - x[front]  # Eq. 4, down to the cap
+    behind = p[_P31_FRONT + d] + p[_P34_FRONT + d] * v - x[front]  # Eq. 4 begins
     front3 = _capped((p[_P32_FRONT + d] if behind >= 0.0 else p[_P33_FRONT + d]) * behind, rules)
     front3 = front3 if (s[front] == 1.0) | (len(rules[_FRONT_LASTS]) == 1) else 0.0
     behind = p[_P31_CONTRA + d] + p[_P34_CONTRA + d] * v - x[contra]
@@ -65,7 +65,7 @@ def _influence(d, x, s, s_old, aep, v, p, k, rules):
     contra3 = contra3 if (s[contra] == 1.0) | (len(rules[_CONTRA_LASTS]) == 1) else 0.0
     pep = pep + front3 + contra3
     if len(rules[_CAP]) == SUM:
-        pep -= front3 + contra3 - 4.0 if front3 + contra3 > 4.0 else 0.0
+        pep -= front3 + contra3 - 4.0 if front3 + contra3 > 4.0 else 0.0  # Eq. 4 ends
     crossed = k[_ORIGIN + d] + x[d] >= k[_ORIGIN + front] + x[front]
     return pep, (k[_PEP_MIN] - aep[d]) * p[_P4_FRONT + d] if crossed else 0.0  # Eq. 5
 

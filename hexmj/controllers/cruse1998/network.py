@@ -94,7 +94,7 @@ class Cruse1998:
     def __post_init__(self) -> None:
         choice("order", self.order, get_args(Order))
         if not isinstance(self.weights, AnyWeights):
-            raise InputError(f"weights = {short(self.weights)}; expected Symmetric or Weights")
+            raise InputError(f"weights = {short(self.weights)}; expected an instance of Symmetric or Weights")
 
     @property
     def mirrored(self) -> bool:

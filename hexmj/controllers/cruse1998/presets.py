@@ -42,7 +42,7 @@ def read_network(table: dict[str, Any], where: str, name: str) -> Cruse1998:
                 values = {f"{kind} {key}": value for kind, entries in kinds.items() for key, value in entries.items()}
                 weights = Weights.of({PLACES[choice("weight", name, PLACES)]: value for name, value in values.items()})
             case tables:
-                raise InputError(f"tables {', '.join(tables)}; expected [symmetric], or [weights.p1] to [weights.p4]")
+                raise InputError(f"tables = {', '.join(tables)}; expected [symmetric], or [weights.p1] to [weights.p4]")
         return Cruse1998(weights, order, name, named_variant(model_variant))
     except (InputError, TypeError) as error:
         raise InputError(f"{where}: {error}") from None

@@ -57,12 +57,12 @@ class Weights:
         for kind in NEIGHBOURS:
             matrix = numbers(kind, getattr(self, kind))
             if matrix.shape != (6, 6) or not np.isfinite(matrix).all():
-                raise InputError(f"{kind} has the shape {matrix.shape}; expected 6 x 6 finite weights")
+                raise InputError(f"{kind}: weights of the shape {matrix.shape}; expected 6 x 6 finite numbers")
             for d, e in np.argwhere(matrix):
                 if e not in NEIGHBOURS[kind][d]:
-                    raise InputError(f"{kind} of leg {LEGS[d]} from leg {LEGS[e]} is not 0; they do not interact")
+                    raise InputError(f"{kind} from {LEGS[e]} to {LEGS[d]} = {matrix[d, e]:g}; expected 0 for this pair")
             if kind in BINARY and not np.isin(matrix, (0.0, 1.0)).all():
-                raise InputError(f"{kind} has a weight between or beyond 0 and 1; expected only 0 or 1")
+                raise InputError(f"{kind} has a weight other than 0 and 1; expected only 0 (off) or 1 (on)")
             matrix.setflags(write=False)
             object.__setattr__(self, kind, matrix)
 
@@ -83,7 +83,7 @@ class Weights:
         """
         values = numbers("weights", vector).ravel()
         if values.size != len(PLACES):
-            raise InputError(f"{values.size} weights; expected {len(PLACES)}")
+            raise InputError(f"vector has {values.size} weights; expected {len(PLACES)}")
         return cls.of(dict(zip(PLACES.values(), values, strict=True)))
 
     def to_vector(self) -> np.ndarray:
