@@ -29,8 +29,9 @@ def progress_bar(label: str) -> Iterator[Progress]:
     """Show a progress bar during a block, and provide its progress function, which any thread may call."""
     from tqdm import tqdm
 
-    style: Any = {"mininterval": 0.1} if sys.stderr.isatty() else {"mininterval": EVERY, "delay": EVERY}
-    style |= {"bar_format": "{desc}: {percentage:.0f} %{bar}{elapsed}, {remaining} left", "leave": False}
+    screen = sys.stderr.isatty()
+    style: Any = {"mininterval": 0.1, "leave": False} if screen else {"mininterval": EVERY, "delay": EVERY}
+    style |= {"bar_format": "{desc}: {percentage:.0f} %{bar}{elapsed}, {remaining} left"}
     with tqdm(desc=f"{label} ({COMPILING})", total=1.0, smoothing=0.0, **style) as bar:
 
         def advance(done: float) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from hexmj.errors import InputError
 from hexmj.legs import FIG1, Geometry
-from hexmj.validate import choice, number, numbers
+from hexmj.validate import number, numbers
 
 OBSERVATION_TIMES = ("walk", "start")
 """Named observation times, see `observation_duration`."""
@@ -109,7 +109,8 @@ def observation_duration(
     v = numbers("velocity", velocity)
     if not isinstance(observation_time, str):
         return np.full(v.shape, number("observation_time", observation_time))
-    choice("observation_time", observation_time, OBSERVATION_TIMES)
+    if observation_time not in OBSERVATION_TIMES:
+        raise InputError(f"observation_time = {observation_time!r}; expected 'walk', 'start' or a number of time units")
     if observation_time == "walk" and (odd := v[~(v > 0)]).size:
         raise InputError(f"velocity = {odd[0]:g} has no period; expected V > 0 with the observation time 'walk'")
     time = stride.periods(v, 3.0) if observation_time == "walk" else np.full(v.shape, 2.0 * (stride.aep0 - stride.pep0))

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from hexmj.cli.options import Figures, Output, Planning, Results, Workers, build, flat, options_class
-from hexmj.cli.output import lists_of, print_json, show
+from hexmj.cli.output import lists_of, show
 from hexmj.errors import RenderingError
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Command:
 
     def execute(self, given: SimpleNamespace) -> None:
         """Run the command, write the manifest, and print the answer."""
-        from hexmj.io import save_manifest, settings
+        from hexmj.io import json_text, save_manifest, settings
 
         if (answer := self.run(given)) is None:
             return
@@ -93,7 +93,7 @@ class Command:
             files.append(save_manifest(given.command, recorded, files, given.out / answer.manifest))
         if given.json:
             head = {} if result is None else {"settings": recorded, "searched": searched(given)}
-            print_json(head | dict(answer.json) | {"files": files})
+            print(json_text(head | dict(answer.json) | {"files": files}))
         else:
             show(*answer.lines, *([] if result is None else [settings_line(given, result)]), *map(str, files))
 

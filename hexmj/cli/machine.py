@@ -17,7 +17,7 @@ from typing import Any
 
 from hexmj.cli.command import Command
 from hexmj.cli.options import Output
-from hexmj.cli.output import print_json, report_checks, show
+from hexmj.cli.output import report_checks, show
 from hexmj.errors import InputError
 
 RENDERING = """
@@ -177,7 +177,7 @@ class Rerun(Command):
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.cli.main import run
-        from hexmj.io import MANIFEST, read_manifest
+        from hexmj.io import MANIFEST, json_text, read_manifest
 
         found = [given.result] if given.result.is_file() else sorted(given.result.glob(f"*{MANIFEST}"))
         if not found:
@@ -197,7 +197,8 @@ class Rerun(Command):
         versions = {name: [old, new] for name, (old, new) in pairs.items() if old != new}
         equal = not any(files.values())
         if given.json:
-            print_json({"equal": equal, "command": then["command"], "differences": files, "versions": versions})
+            answer = {"equal": equal, "command": then["command"], "differences": files, "versions": versions}
+            print(json_text(answer))
         else:
             show(*(f"{name}: {text or 'all bits are equal'}" for name, text in files.items()))
             show(*(f"version of {name}: {old} in the manifest, {new} now" for name, (old, new) in versions.items()))

@@ -70,8 +70,10 @@ def main() -> None:
     use_egl_without_display()
     try:
         run(sys.argv[1:])
-    except KeyboardInterrupt:
-        _exit("Stopped. Repeat the command to resume.", 130)
+    except (KeyboardInterrupt, SystemError) as error:
+        if isinstance(error, SystemError) and not isinstance(error.__cause__, KeyboardInterrupt):
+            raise  # Ctrl-C within compiled code is a SystemError
+        _exit("Stopped. The same command continues after the parts that are finished.", 130)
     except InputError as error:
         _exit(error, 2)
     except (SimulationError, RenderingError) as error:

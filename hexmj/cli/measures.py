@@ -97,7 +97,8 @@ class Flss(StudyCommand):
         from hexmj.measures.compare import PhysicalFlss
 
         no_effect(given, ["range_of"], "with --physical", {"range_of": None})
-        return build(PhysicalFlss, given, controllers={given.controller: controller(given, given.controller)})
+        planned = controller(given, given.controller)
+        return build(PhysicalFlss, given, controllers={planned.name: planned})
 
     def result(self, given: SimpleNamespace, study: Any) -> "xr.Dataset":
         from hexmj.io import attributes

@@ -30,13 +30,6 @@ def show(*parts: Any) -> None:
         console.print(part if isinstance(part, str) else Padding(part, (1, 0), expand=False))
 
 
-def print_json(value: dict[str, Any]) -> None:
-    """Print a JSON object."""
-    from hexmj.io import json_text
-
-    print(json_text(value))
-
-
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> "Table":
     """Return a table of texts; if it is wider than the screen, long cells continue on further lines."""
     from rich import box
@@ -146,5 +139,7 @@ def report_checks(findings: Iterable[Any], json: bool, **beside: Any) -> NoRetur
             print(f"{kind}  {finding.name}: {finding.found}{remedy}", flush=True)
     well = all(finding.well for finding in checks)
     if json:
-        print_json(beside | {"well": well, "checks": [asdict(finding) for finding in checks]})
+        from hexmj.io import json_text
+
+        print(json_text(beside | {"well": well, "checks": [asdict(finding) for finding in checks]}))
     sys.exit(0 if well else 1)

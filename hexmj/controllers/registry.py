@@ -4,6 +4,7 @@ import re
 import sys
 from collections.abc import Iterator
 from dataclasses import is_dataclass, replace
+from difflib import get_close_matches
 from enum import Enum
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -60,10 +61,10 @@ def load_controller(name: str) -> Controller:
     if file := parameter_file(name):
         table = read_toml(file)
         return _from_table(file, table) if "controller" in table else read_network(table, name, file.stem)
-    raise InputError(
-        f"controller {name!r} is neither a file nor one of {', '.join(known_names())}; expected such a name,"
-        " file.toml, file.py:object or module:object"
-    )
+    names = [*known_names()]
+    hint = "".join(f" Did you mean {near}?" for near in get_close_matches(name, names, 1))
+    forms = "file.toml, file.py:object, module:object"
+    raise InputError(f"controller {name!r} does not exist.{hint} Expected {forms} or one of {', '.join(names)}")
 
 
 def known_names() -> Iterator[str]:
@@ -111,6 +112,8 @@ def _object(where: str, what: str, name: str) -> Controller:
 def _module(where: str) -> ModuleType:
     """Import a module or a .py file; the file's directory joins sys.path, so that worker processes import it too."""
     path = Path(where).absolute()
+    if path.suffix == ".py" and not path.is_file():
+        raise InputError(f"{where} does not exist")
     if path.suffix == ".py" and str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
     try:

@@ -112,6 +112,7 @@ def takes_of(recordings: Sequence[xr.Dataset], body: Body, most: int) -> list[Ta
     Raises:
         InputError: there are too many recordings or none, or `Take.of` cannot read a recording.
     """
+    recordings = [recordings] if isinstance(recordings, xr.Dataset) else recordings
     if not 1 <= len(recordings) <= most:
         raise InputError(f"{len(recordings)} recordings; expected 1 to {most}")
     return [Take.of(recording, body) for recording in recordings]
