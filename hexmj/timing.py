@@ -86,14 +86,6 @@ def check_reached(velocity: np.ndarray, stride: Stride, acceleration: Accelerati
         raise InputError(f"V = {velocity.max():g}, to which one time step adds {step:g}; expected a sum below 1")
 
 
-def check_in_time(velocity: np.ndarray, duration: np.ndarray, acceleration: Acceleration | None) -> None:
-    """Raise InputError if Eq. 11 does not reach a V_r, (velocity,), within its duration, (velocity,) [time units]."""
-    if acceleration and (late := np.flatnonzero(duration < acceleration.duration(velocity) * (1.0 - 1e-9))).size:
-        v, end = velocity[late[0]], duration[late[0]]
-        late_by = f"V = {v:g} is reached after {acceleration.duration(v):g} time units, but the walk ends after {end:g}"
-        raise InputError(f"{late_by}; expected a longer observation time, or 'walk' or 'start'")
-
-
 def observation_duration(
     observation_time: str | float, velocity: ArrayLike, stride: Stride, acceleration: Acceleration | None = None
 ) -> np.ndarray:

@@ -82,12 +82,7 @@ class PhysicalFlss(Comparison):
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the dataset that `physical_flss` describes, from the datasets of all cells."""
-        result = super().result(data)
-        fell = tables.losses_by_sample(np.isfinite(result.fall.values[0]))
-        table = tables.frequency_table(fell, result.sizes["start"], result.velocity.values, result.duration.values)
-        beside = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
-        reported = result.isel(controller=0, drop=True)[[*beside, "fall", *BESIDE.values(), *REPORTED]]
-        return table.assign(reported.drop_vars("duration").data_vars).assign_attrs(result.attrs | {"study": "flss"})
+        return _falls(super().result(data))
 
 
 def compare(
@@ -101,7 +96,6 @@ def compare(
     stride: Stride = Comparison.stride,
     acceleration: Acceleration | None = None,
     folder: Path | None = None,
-    study: type[Comparison] = Comparison,
     **how: Unpack[Execution],
 ) -> "xr.Dataset":
     """Return the kinematic, measured and physical FLSS of controllers over velocities, on the same starts.
@@ -111,7 +105,6 @@ def compare(
         velocities: one or several V_r, each 0 <= V < 1; the final velocities when accelerating.
         n_starts, observation_time, seed, conditions, stride, acceleration: fields of `Comparison`.
         folder: directory in which finished cells are cached; None caches nothing.
-        study: `Comparison`, or a subclass that returns another table.
         how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
 
     Returns:
@@ -127,7 +120,7 @@ def compare(
     named = controllers if isinstance(controllers, Mapping) else {getattr(controllers, "name", "?"): controllers}
     walks: Any = {"n_starts": n_starts, "seed": seed, "conditions": conditions, "stride": stride}
     walks |= {"velocities": np.atleast_1d(velocities).tolist(), "observation_time": observation_time}
-    return run_study(study(named, acceleration=acceleration, **walks), folder, **how)
+    return run_study(Comparison(named, acceleration=acceleration, **walks), folder, **how)
 
 
 def physical_flss(
@@ -148,7 +141,16 @@ def physical_flss(
     Raises:
         InputError, SimulationError: see `compare`.
     """
-    return compare(controller, velocities, n_starts=n_starts, study=PhysicalFlss, **options)
+    return _falls(compare(controller, velocities, n_starts=n_starts, **options))
+
+
+def _falls(result: "xr.Dataset") -> "xr.Dataset":
+    """Return the dataset of `physical_flss` from a comparison of one controller."""
+    fell = tables.losses_by_sample(np.isfinite(result.fall.values[0]))
+    table = tables.frequency_table(fell, result.sizes["start"], result.velocity.values, result.duration.values)
+    beside = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
+    reported = result.isel(controller=0, drop=True)[[*beside, "fall", *BESIDE.values(), *REPORTED]]
+    return table.assign(reported.drop_vars("duration").data_vars).assign_attrs(result.attrs | {"study": "flss"})
 
 
 def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr.Dataset":

@@ -8,10 +8,11 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, settings_of
+from hexmj.errors import InputError
 from hexmj.starts import SAMPLE, checked_list, draw_starts
 from hexmj.stats import paired_difference, wilson_intervals
 from hexmj.sweep import over_axes
-from hexmj.timing import Acceleration, Stride, check_in_time, check_reached, observation_duration, steps_within
+from hexmj.timing import Acceleration, Stride, check_reached, observation_duration, steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,7 +70,10 @@ def observed(
     v = checked_list(np.atleast_1d(velocities).tolist(), acceleration)
     check_reached(v, stride, acceleration)
     duration = observation_duration(observation_time, v, stride, acceleration)
-    check_in_time(v, duration, acceleration)
+    if acceleration and (late := np.flatnonzero(duration < acceleration.duration(v) * (1.0 - 1e-9))).size:
+        slow, end = v[late[0]], duration[late[0]]
+        reached = f"V = {slow:g} is reached after {acceleration.duration(slow):g} time units"
+        raise InputError(f"{reached}, but the walk ends after {end:g}; expected a longer observation time")
     steps_within(duration, stride)
     return v, duration
 

@@ -74,7 +74,7 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
     heading = "The league: trials, steady-state gaits and costs; best in physics first"
     figure, axes, images = _drawn(heading, shown, panels, "fewer starts in trials: or plans not stable until then")
     for ax, image in zip(axes, images, strict=True):
-        figure.colorbar(image, ax=ax, location="bottom", **BAR, aspect=23).ax.locator_params(nbins=4)
+        figure.colorbar(image, ax=ax, location="bottom", **BAR, aspect=23).ax.locator_params(nbins=2)
     turned: dict[str, Any] = {"rotation": 60, "ha": "right", "rotation_mode": "anchor", "fontsize": 8}
     axes[0].set_xticks(range(shown.sizes["trial"]), shown.trial.values, **turned)
     axes[0].set_xlabel("")
