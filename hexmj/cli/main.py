@@ -73,7 +73,7 @@ def main() -> None:
     except (KeyboardInterrupt, SystemError) as error:
         if isinstance(error, SystemError) and not isinstance(error.__cause__, KeyboardInterrupt):
             raise  # Ctrl-C within compiled code is a SystemError
-        _exit("Stopped. The same command continues after the parts that are finished.", 130)
+        _exit("Stopped. A repeated study resumes after its finished cells.", 130)
     except InputError as error:
         _exit(error, 2)
     except (SimulationError, RenderingError) as error:

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -225,6 +224,6 @@ class View(Command):
             from hexmj.replay.page import page_text
             from hexmj.view.browser import page_server
 
-            with suppress(KeyboardInterrupt), page_server(page_text([recording]), given.host, given.port) as server:
+            with page_server(page_text([recording]), given.host, given.port) as server:
                 show(f"{given.recording} plays at http://{given.host}:{server.server_port}", END)
                 server.serve_forever(poll_interval=0.1)
