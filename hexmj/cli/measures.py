@@ -182,8 +182,7 @@ class Compare(StudyCommand):
 
         axes, names = ("controller", "velocity"), ("both", "kin.", "phys.", "none")
         columns: dict[str, Column] = {"t": lambda data: four_digits(data.duration.item())}
-        counts = {heading: _count(name) for heading, name in zip(names, AGREEMENT, strict=True)}
-        answers = {"agree": "agreement", **counts, **{name: name for name in BESIDE}}
+        answers = {"agree": "agreement", **dict(zip(names, AGREEMENT, strict=True)), **{name: name for name in BESIDE}}
         yield "Frequency of the loss of static stability, with 95 % intervals; physical: falls"
         yield grid(result, axes, columns | {name: name for name in MEASURES})
         yield (
@@ -192,10 +191,6 @@ class Compare(StudyCommand):
         )
         yield grid(result, axes, answers | {"speed": _speeds})
         yield report_line(physical_report(result))
-
-
-def _count(name: str) -> Column:
-    return lambda data: f"{data[name].item()}"
 
 
 def _speeds(data: "xr.Dataset") -> str:

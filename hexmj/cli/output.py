@@ -90,7 +90,9 @@ def _text(data: "xr.Dataset", column: Column) -> str:
     """Return the text of a cell; if `column` names a variable, its number and, if the data have it, its interval."""
     if not isinstance(column, str):
         return column(data)
-    return interval(data, column) if f"{column}_low" in data else f"{data[column].item():.3f}"
+    if f"{column}_low" in data:
+        return interval(data, column)
+    return f"{data[column].item():{'d' if data[column].dtype.kind == 'i' else '.3f'}}"
 
 
 def interval(data: "xr.Dataset", measure: str) -> str:
@@ -111,10 +113,8 @@ def four_digits(value: float) -> str:
 
 
 def lists_of(result: "xr.Dataset") -> dict[str, Any]:
-    """Return the coordinates and variables of a result as lists, and its settings, for the JSON answer."""
-    from hexmj.io import settings
-
-    return {str(name): result[name].values.tolist() for name in result.variables} | {"settings": settings(result)}
+    """Return the coordinates and variables of a result as lists, for the JSON answer."""
+    return {str(name): result[name].values.tolist() for name in result.variables}
 
 
 def report_line(report: dict[str, float]) -> str:

@@ -76,6 +76,16 @@ class Observer:
 
 
 @jitted
+def scaled(actions: Any, ids: Any, default: Any, below: Any, above: Any) -> Any:
+    """Return the joint targets [rad] or tip offsets [mm], (n, number), of normalised actions, (insect, number)."""
+    values = np.empty((len(ids), actions.shape[1]))
+    for i, n in enumerate(ids):
+        for j in range(values.shape[1]):
+            values[i, j] = default[j] + actions[n, j] * (above[j] if actions[n, j] > 0 else below[j])
+    return values
+
+
+@jitted
 def next_targets(actions: Any, ids: Any, ahead: Any, planned: Any, offset: bool) -> Any:
     """Return the tip targets of n insects for the next step, in the root frame, (n, substep, leg, axis) [mm].
 

@@ -158,7 +158,8 @@ def checked_actions(
     actions = np.asarray(actions, dtype=float)
     if actions.shape != shape:
         raise InputError(f"the action has the shape {actions.shape}; expected {shape}")
-    if not (within := (actions >= low - ROUNDING) & (actions <= high + ROUNDING)).all():
+    within = (actions >= low - ROUNDING) & (actions <= high + ROUNDING)
+    if np.count_nonzero(within) < within.size:  # faster than `all`
         raise InputError(f"the action has {actions[~within][0]}; expected values within the action space")
     return actions
 

@@ -18,7 +18,7 @@ from hexmj.bodies.kinematics import standing_tips
 from hexmj.controllers.planning import advanced
 from hexmj.controllers.planning import begin as begin_plan
 from hexmj.controllers.protocol import FeedbackPlan, Plan
-from hexmj.environments.observing import Observer, Places, Planned, end_step, next_targets
+from hexmj.environments.observing import Observer, Places, Planned, end_step, next_targets, scaled
 from hexmj.environments.task import Task, action_bounds
 from hexmj.errors import InputError
 from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, walk_error
@@ -132,8 +132,7 @@ class Walkers:
         self.check_begun()
         if self.over:
             return self._nothing()
-        actions = actions[self._ids]
-        control = self.control(self._default + actions * np.where(actions > 0, self._above, self._below))
+        control = self.control(scaled(actions, self._ids, self._default, self._below, self._above))
         try:
             return self.judge(self._take(self._ids, control))
         except Diverged as error:
@@ -163,7 +162,7 @@ class Walkers:
         tips = next_targets(actions, ids, self._ahead, self._passed[1], offset)
         if offset:
             joints, reachable = self._compiled.inverse(tips)
-            if not reachable.all():
+            if np.count_nonzero(reachable) < reachable.size:
                 self._planned.missed[ids] = substeps - reachable.sum(axis=1)
                 hold(joints.swapaxes(0, 1), self._joints[ids])
             self._joints[ids] = joints[:, -1]

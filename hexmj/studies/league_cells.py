@@ -12,7 +12,6 @@ from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import VARIED, known_names, load_controller
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES, steady_state_gait
-from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.study import UNITS, Study, by_halves, standing_starts
 from hexmj.measures.tables import FRESH, PERIODS, WalkSettings, happened, over_start
@@ -112,10 +111,7 @@ class EntrantWalks(WalkSettings):
         if not self.ideal:
             return super().starts
         controller: Any = self.controller
-        start = np.array(controller.ideal_start(self.velocity, self.stride), dtype=float)
-        if start.shape != (1, len(LEGS)):
-            raise InputError(f"{self.controller.name}.ideal_start returns the shape {start.shape}; expected (1, 6)")
-        return start
+        return np.array(controller.ideal_start(self.velocity, self.stride), dtype=float)
 
     def losses(self, threads: int | None = None) -> "xr.Dataset":
         """Return `lost`: 1 for each start that loses static stability in its planned walk, else 0."""
