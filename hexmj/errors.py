@@ -17,7 +17,7 @@ class Refused(InputError):
 
 
 class StillThrown(InputError):
-    """Raised if a walk ends while a push still acts, so that the outcome is unknown."""
+    """Raised if a walk ends while its start is still thrown by a push, so that the outcome is unknown."""
 
 
 class SimulationError(RuntimeError):

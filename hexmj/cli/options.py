@@ -60,7 +60,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Results:
-    """Options of the files of a study."""
+    """Where a study writes its files."""
 
     out: Path = Path("results")
     """Folder for figures, NetCDF, manifest and cached results."""

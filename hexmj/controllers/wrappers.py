@@ -107,7 +107,7 @@ class LamePlan(WrappedPlan):
 
 @dataclass(frozen=True)
 class PoorSenses(Wrapper):
-    """A controller with sensory feedback that senses its tips with noise, or all its senses with a delay.
+    """A controller with sensory feedback that receives its tips with noise and all its senses with a delay.
 
     The noise does not affect controllers that sense only loads or contacts, as some baselines do.
     """

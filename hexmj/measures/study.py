@@ -99,7 +99,7 @@ class Study:
         return WalkSettings(controller, velocity, duration, *same)
 
     def check_walks(self, velocities: Sequence[float], *conditions: Conditions) -> None:
-        """Raise InputError if a controller refuses a velocity or adhesion presses the feet too deep into the ground."""
+        """Raise InputError if adhesion presses the feet too deep into the ground, or a controller refuses a V_r."""
         from hexmj.physics.settle import check_adhesion
 
         for controller in self.plans().values():

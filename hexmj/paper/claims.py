@@ -42,7 +42,7 @@ class Rule:
 
     @property
     def words(self) -> str:
-        """Text of the rule for the table of claims."""
+        """The rule in words, for the table of claims."""
         raise NotImplementedError
 
     def judged(self, points: list[Point]) -> Answer:
@@ -78,7 +78,7 @@ class Band(Rule):
 
     @property
     def words(self) -> str:
-        """Text of the rule for the table of claims."""
+        """The rule in words, for the table of claims."""
         if self.over == "changes":
             change = f"from each V to the next, over {self.span}, the 95 % interval of the change of"
             return f"{change} {self.quantity.words} reaches {'above' if self.least == 0 else 'below'} 0"
@@ -121,7 +121,7 @@ class Seen(Rule):
 
     @property
     def words(self) -> str:
-        """Text of the rule for the table of claims."""
+        """The rule in words, for the table of claims."""
         return (
             f"at {self.span} Fisher's test finds no difference between {self.quantity.words} and {self.count} of"
             f" {self.of} starts, the paper's own sample (p >= {LEVEL:g})"

@@ -32,7 +32,7 @@ def can_push(conditions: Conditions, stride: Stride, observation_time: float = n
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """A push from the side at the root of each start; it lasts `PUSH_LASTS`, rounded to whole steps of the plan."""
+    """Pushes from the side on the root body, at most one per start; each lasts `PUSH_LASTS`, in whole plan steps."""
 
     impulse: np.ndarray
     """(start,) impulse to the left [g mm/s]; 0 means no push."""

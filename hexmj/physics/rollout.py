@@ -193,7 +193,7 @@ class Rollout:
         return Chunk(plan, first.first, first.ids, **whole, valid=valid, fell=fell, unreachable=unreachable)
 
     def check_landed(self, ids: np.ndarray) -> None:
-        """Raise StillThrown if a push still gives one of the starts `ids`, (n,), more energy than a walk has."""
+        """Raise StillThrown if a pushed start among `ids`, (n,), still has more energy than a walk without a push."""
         pushed, settled = self._pushed[ids] != 0.0, self.settled
         speed = np.linalg.norm(self._batch.qvel[ids, :3], axis=1)
         height = self._batch.qpos[ids, 2] - settled.conditions.highest_ground

@@ -110,9 +110,9 @@ class LiftedPlan(StepwisePlan):
 
 
 class Lifted:
-    """Base class that makes a `protocol.SteerableController` of a rule that decides which legs are lifted.
+    """Base class that turns a rule for lifting legs into a `protocol.SteerableController`.
 
-    A rule, `at_start` and `lifts`, treats every start independently and does not change its arguments.
+    The rule's methods, `at_start` and `lifts`, treat every start independently and do not change their arguments.
     """
 
     reads_load = False
