@@ -90,9 +90,8 @@ def _text(data: "xr.Dataset", column: Column) -> str:
     """Return the text of a cell; if `column` names a variable, its number and, if the data have it, its interval."""
     if not isinstance(column, str):
         return column(data)
-    if f"{column}_low" in data:
-        return interval(data, column)
-    return f"{data[column].item():{'d' if data[column].dtype.kind == 'i' else '.3f'}}"
+    form = "d" if data[column].dtype.kind == "i" else ".3f"
+    return interval(data, column) if f"{column}_low" in data else f"{data[column].item():{form}}"
 
 
 def interval(data: "xr.Dataset", measure: str) -> str:

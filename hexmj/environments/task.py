@@ -40,9 +40,10 @@ from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
+from hexmj.jitted import jitted
 from hexmj.legs import LEGS
 from hexmj.timing import Stride, steps_within
-from hexmj.validate import choice, number
+from hexmj.validate import choice, number, short
 
 Actions = Literal["joints", "tips"]
 """Kinds of actions: 'joints' are targets of the joints, 'tips' are offsets to the planned tips."""
@@ -158,10 +159,14 @@ def checked_actions(
     actions = np.asarray(actions, dtype=float)
     if actions.shape != shape:
         raise InputError(f"the action has the shape {actions.shape}; expected {shape}")
-    within = (actions >= low - ROUNDING) & (actions <= high + ROUNDING)
-    if np.count_nonzero(within) < within.size:  # faster than `all`
-        raise InputError(f"the action has {actions[~within][0]}; expected values within the action space")
+    if not _within(actions, low, high):
+        raise InputError(f"action = {short(actions)}; expected values within the action space")
     return actions
+
+
+@jitted
+def _within(actions: Any, low: Any, high: Any) -> bool:
+    return ((actions >= low - ROUNDING) & (actions <= high + ROUNDING)).all()
 
 
 def draw_start(rng: np.random.Generator, task: Task) -> np.ndarray:

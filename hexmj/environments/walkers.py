@@ -71,7 +71,7 @@ class Walkers:
         """Prepare `count` insects, which `threads` threads settle at their starts, by default one per core."""
         self._task, self._compiled, self._threads = task, compiled, threads
         self._settling = Settling(task.conditions, task.stride, threads)
-        self._steps, self._substeps = task.steps, task.substeps
+        self._steps, self._substeps, self._command = task.steps, task.substeps, task.command
         self._count, self._ids = count, np.arange(0)
         self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
         self.begun = False
@@ -84,6 +84,7 @@ class Walkers:
         low, self._default, high = action_bounds(compiled, task)
         self._below, self._above = self._default - low, high - self._default
         self.observer = Observer(compiled, task)
+        self._trunk = compiled.columns.trunk.start, compiled.columns.trunk.stop
         self.bind(bodies)
 
     def bind(self, bodies: Bodies) -> None:
@@ -176,12 +177,12 @@ class Walkers:
 
     def judge(self, shown: Shown) -> Acted:
         """Return the result of a step from its record, (n, substep, ...), and end the episodes that are over."""
-        ids, acted, columns = self._ids, self._nothing(), self._compiled.columns
+        ids, acted = self._ids, self._nothing()
         self._senses.feel(ids, shown["sensors"], shown["force"])
-        trunk, time = (columns.trunk.start, columns.trunk.stop), (self._done, self._steps)
-        ended = end_step(self._passed[0], ids, shown["sensors"], trunk, self._task.command, time, tuple(acted))
+        time, result = (self._done, self._steps), tuple(acted)
+        ended = end_step(self._passed[0], ids, shown["sensors"], self._trunk, self._command, time, result)
         if self._task.conditions.ground in WITH_ENDS:
-            feet = self.places.sensors[ids, columns.foot].reshape(-1, 6, 3)
+            feet = self.places.sensors[ids, self._compiled.columns.foot].reshape(-1, 6, 3)
             beyond = beyond_the_ground(self._task.conditions, feet).any(axis=1)
             acted.truncated[ids] |= beyond & ~acted.terminated[ids]
             ended |= bool(beyond.any())
@@ -221,7 +222,7 @@ class Walkers:
 
     def _nothing(self) -> Acted:
         """Return the result of a step in which no insect walks: zeros and False."""
-        return Acted(np.zeros(self._count), *np.zeros((2, self._count), dtype=bool))
+        return Acted(np.zeros(self._count), np.zeros(self._count, dtype=bool), np.zeros(self._count, dtype=bool))
 
 
 class Alone:
@@ -262,10 +263,9 @@ class Alone:
 
     def roll(self, ids: np.ndarray, control: np.ndarray, parts: int) -> Rolled:
         """Take substeps, see `engine.Engine.roll`; the record has neither torques nor states."""
-        model, data, count = self.model, self.data, control.shape[1]
+        model, data, count, now, pull = self.model, self.data, control.shape[1], self._sensors, self._force
         before, nothing = np.empty((1, self._size)), np.empty((1, count, 0))
-        sensors = np.empty((1, count + 1, len(self._sensors)))
-        force = np.empty((1, count, len(self._force)))
+        sensors, force = np.empty((1, count + 1, len(now))), np.empty((1, count, len(pull)))
         mujoco.mj_getState(model, data, before[0], _STATE)
         if parts > 1:
             model = copy(model)  # another thread may use the model
@@ -275,11 +275,11 @@ class Alone:
         for k in range(count):
             self._control[:] = control[0, k]
             (mujoco.mj_step if k else mujoco.mj_step2)(model, data)
-            sensors[0, k], force[0, k] = self._sensors, self._force  # positions are those before the substep
+            sensors[0, k], force[0, k] = now, pull  # positions are those before the substep
         mujoco.mj_step1(self.model, data)
         if np.count_nonzero(self._warned):
             raise self._diverged(before[0])
-        sensors[0, count] = self._sensors
+        sensors[0, count] = now
         feet = sensors[:, :, self._foot].reshape(1, count + 1, 6, 3)
         return Rolled(before, feet, sensors[:, :count], force, torque=nothing, after=nothing)
 

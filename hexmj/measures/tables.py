@@ -71,9 +71,8 @@ def observed(
     check_reached(v, stride, acceleration)
     duration = observation_duration(observation_time, v, stride, acceleration)
     if acceleration and (late := np.flatnonzero(duration < acceleration.duration(v) * (1.0 - 1e-9))).size:
-        slow, end = v[late[0]], duration[late[0]]
-        reached = f"V = {slow:g} is reached after {acceleration.duration(slow):g} time units"
-        raise InputError(f"{reached}, but the walk ends after {end:g}; expected a longer observation time")
+        reached = f"V = {v[late[0]]:g} is reached after {acceleration.duration(v[late[0]]):g} time units"
+        raise InputError(f"{reached}, but the walk ends after {duration[late[0]]:g}; increase the observation time")
     steps_within(duration, stride)
     return v, duration
 
