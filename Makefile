@@ -4,7 +4,7 @@
 # make bench      every speed beside a peer, under ten minutes; ARGS="..." goes to pytest
 # make lint       style and types
 # make docs       the documentation, in results/site; `python3 -m http.server -d results/site` serves it
-# make gallery    the documentation's films of walks, in docs/gallery
+# make gallery    the documentation's films of walks, in docs/images
 # PYTHON=...      the Python, 3.11 or newer, for .venv
 
 PYTHON ?= python3
@@ -43,7 +43,7 @@ docs: .venv/dev
 	NO_MKDOCS_2_WARNING=1 .venv/bin/python -m mkdocs build --quiet --strict
 
 gallery: .venv/project system
-	.venv/bin/python examples/gallery.py docs/gallery
+	.venv/bin/python examples/gallery.py docs/images
 
 # Libraries for rendering without a display; everything else works without them.
 system:

@@ -1,6 +1,6 @@
 """The documentation's gallery: short films of walks, as animated WebP.
 
-They are written into `results/gallery`, or by `make gallery` into `docs/gallery`.
+They are written into `results/gallery`, or by `make gallery` into `docs/images`.
 """
 
 import subprocess

@@ -32,7 +32,7 @@ FAR = 1e6
 
 @dataclass(frozen=True)
 class Stride:
-    """Step range, lines of the tips and time step of every controller; all are inferred (docs/constants.md)."""
+    """Step range, tip lines and time step of every controller; all are inferred (docs/reference/constants.md)."""
 
     aep0: float = 10.0
     """Anterior extreme position without influences, on each leg's own axis [mm]."""

@@ -27,7 +27,7 @@ COMMANDS = [command for command, comment in LINES if not comment.startswith("lon
 EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
 LONG_EXAMPLES = {"gallery", "model_variants", "servo_hexapod", "train_cma", "train_ppo", "variants"}
 """Examples that take minutes. Their functions are tested at a small size, here, in test_learned or by features.py."""
-NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+NOTEBOOKS = sorted((ROOT / "docs/tutorials").glob("*.ipynb"))
 
 
 def blocks(page: str) -> list[str]:
@@ -116,7 +116,7 @@ def test_the_servo_hexapod_walks_and_its_controller_scales(folder, monkeypatch):
 def test_a_notebook_runs(path: Path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     code = "import sys; from pathlib import Path; import run; run.executed(Path(sys.argv[1]))"
-    subprocess.run([sys.executable, "-c", code, str(path)], cwd=ROOT / "notebooks", check=True)
+    subprocess.run([sys.executable, "-c", code, str(path)], cwd=path.parent, check=True)
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

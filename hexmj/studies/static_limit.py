@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 GROUNDED = 0.05
 """Height, as a fraction of the standing height, up to which a foot counts as standing in `grounded`. Values from 0.05
-to 0.2 change FLSS at V_p = 20 mm/s by at most 0.04 (`docs/static_limit.md`)."""
+to 0.2 change FLSS at V_p = 20 mm/s by at most 0.04 (`docs/concepts/physics.md`)."""
 
 LOSSES = {"kinematic": "planned_loss", "measured": "measured_loss", "grounded": "grounded_loss", "physical": "fall"}
 """Measure of FLSS -> outcome, the time of the event that it counts: the measures `compare.MEASURES`, and `grounded`,

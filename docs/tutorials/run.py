@@ -1,4 +1,4 @@
-"""Run the notebooks and store their output: `python notebooks/run.py`."""
+"""Run the notebooks and store their output: `python docs/tutorials/run.py`."""
 
 from argparse import ArgumentParser
 from pathlib import Path
