@@ -29,13 +29,13 @@ class Outcomes:
     """Outcomes of each start. Times are in time units, inf for events that did not happen. Measures end at the fall."""
 
     planned_loss: np.ndarray
-    """(start,) time of the plan's first loss of static stability, with planned stance and the centre of mass at O."""
+    """(start,) first loss of static stability of the plan: planned stance, centre of mass at O [time units]."""
     measured_loss: np.ndarray
-    """(start,) time of the first measured loss of static stability: feet in contact, the body's centre of mass."""
+    """(start,) first measured loss of static stability: feet in contact, the body's centre of mass [time units]."""
     fall: np.ndarray
-    """(start,) time at which the trunk first touches the ground (environments detect falls in `observing.judge`)."""
+    """(start,) first contact of the trunk with the ground [time units]; environments use `observing.judge`."""
     topple: np.ndarray
-    """(start,) time at which the trunk is first tilted by more than `TOPPLED`."""
+    """(start,) time at which the trunk first tilts by more than `TOPPLED`, 0.1 rad [time units]."""
     fall_part: np.ndarray
     """(start,) index in `Body.trunk` of the part that touches the ground first; -1 without a fall."""
     clearance: np.ndarray
