@@ -4,6 +4,7 @@ A page contains `<!-- generated: NAME -->`; the function of that name in `GENERA
 """
 
 import ast
+import logging
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
@@ -31,9 +32,15 @@ from hexmj.controllers.registry import searched_on
 from hexmj.physics.outcomes import Outcomes
 from hexmj.replay import recording
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+ROOT = Path(__file__).parents[1]
 FOLDED = {"walk": "Options of the plan", "conditions": "Conditions", "execution": "Execution"}
 """Group of options that many commands share -> its title on the page, where it is folded."""
+
+
+def on_startup(**_: Any) -> None:
+    """Report warnings with --quiet too; without this, --quiet hides them from --strict."""
+    log = logging.getLogger("mkdocs")
+    log.setLevel(min(log.level, logging.WARNING))
 
 
 def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
@@ -225,9 +232,14 @@ def insect() -> str:
 def examples() -> str:
     """Return the scripts in `examples/` with the first line of their docstrings."""
     first = (
-        (path.name, ast.get_docstring(ast.parse(path.read_text())) or "") for path in sorted(EXAMPLES.glob("*.py"))
+        (path.name, ast.get_docstring(ast.parse(path.read_text())) or "") for path in sorted(ROOT.glob("examples/*.py"))
     )
     return table(("script", "what it shows"), ((f"`{name}`", text.partition("\n")[0]) for name, text in first))
+
+
+def from_root(name: str) -> str:
+    """Return a page of the repository's root, with links that work from `docs/project/`."""
+    return (ROOT / name).read_text(encoding="utf-8").replace("](docs/", "](../")
 
 
 GENERATED: dict[str, Callable[[], str]] = {
@@ -241,5 +253,7 @@ GENERATED: dict[str, Callable[[], str]] = {
     "weights": weight_sets,
     "insect": insect,
     "examples": examples,
+    "contributing": lambda: from_root("CONTRIBUTING.md"),
+    "changelog": lambda: from_root("CHANGELOG.md"),
 }
 """Name in a marker -> function that returns the Markdown in its place."""

@@ -146,7 +146,7 @@ def test_invalid_settings_are_refused(name, make):
     ],
 )
 def test_our_own_sets_beat_the_papers(observation_time, names, velocities):
-    """On fresh starts; over the observation time `start` LDVS is better than `own` at V = 0.1 (docs/results/paper.md)."""
+    """On fresh starts; over the observation time `start` LDVS is better than `own` at V = 0.1."""
     for v in velocities:
         own, papers = (
             [

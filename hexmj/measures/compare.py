@@ -103,7 +103,12 @@ def compare(
     Args:
         controllers: one controller, or several controllers by name.
         velocities: one or several V_r, each 0 <= V < 1; the final velocities when accelerating.
-        n_starts, observation_time, seed, conditions, stride, acceleration: fields of `Comparison`.
+        n_starts: number of random starts.
+        observation_time: 'walk', 'start' or a number of time units, see `timing.observation_duration`.
+        seed: seed of the random starts.
+        conditions: V_p, body, ground and contacts of the physical walks.
+        stride: step range, lines of the tips and time step.
+        acceleration: the accelerating procedure of Eq. 11; without it V_r is constant.
         folder: directory in which finished cells are cached; None caches nothing.
         how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
 
@@ -139,7 +144,8 @@ def physical_flss(
         (velocity, start) the times `fall` and `topple`, and the outcomes `REPORTED`.
 
     Raises:
-        InputError, SimulationError: see `compare`.
+        InputError: an argument is out of range.
+        SimulationError: an insect does not come to rest at its start, or a walk diverges.
     """
     return _falls(compare(controller, velocities, n_starts=n_starts, **options))
 

@@ -187,7 +187,11 @@ def flss(
     Args:
         controller: controller that plans the walks.
         velocities: one or several V_r, each 0 <= V < 1; the final velocities when accelerating.
-        n_starts, observation_time, seed, stride, acceleration: fields of `KinematicFlss`.
+        n_starts: number of random starts.
+        observation_time: 'walk', 'start' or a number of time units, see `timing.observation_duration`.
+        seed: seed of the random starts.
+        stride: step range, lines of the tips and time step.
+        acceleration: the accelerating procedure of Eq. 11; without it V_r is constant.
         range_of: number of starts that are computed and cached together; the result does not depend on it.
         folder: directory in which finished cells are cached; None caches nothing.
         how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
@@ -221,7 +225,10 @@ def flss_over_range(
         controller: controller that plans the walks.
         low: lowest velocity of the uniform range W, 0 <= V < 1, and above 0 with the observation time 'walk'.
         high: highest velocity of the range W.
-        n_starts, observation_time, seed, stride: see `flss`; the times 'walk' and 'start' depend on each velocity.
+        n_starts: number of random starts.
+        observation_time: as for `flss`; 'walk' and 'start' depend on the velocity of each start.
+        seed: seed of the random starts and velocities.
+        stride: step range, lines of the tips and time step.
         threads: number of threads, by default one per core; the result does not depend on it.
 
     Returns:

@@ -82,7 +82,8 @@ def physical_walk(
         progress: True shows a bar; a function is called with the fraction done since its last call.
 
     Raises:
-        InputError, SimulationError: see `settle.settle` and `rollout.drive`.
+        InputError: an argument is out of range, a start is out of reach, or the walk crosses an edge of the ground.
+        SimulationError: an insect does not come to rest at its start, or a walk diverges.
     """
     check_ground(conditions)
     kinematic = begin(controller, starts, velocity, stride, acceleration, threads)

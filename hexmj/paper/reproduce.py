@@ -118,7 +118,7 @@ class Report:
             *(f"- {sentence}" for sentence in self.summary), "",
             *io.markdown_table(heads, rows), "", "## Rules and commands", "",
             *io.markdown_table(("the paper", "agrees if", "command"), rules), "",
-            "## Judged in physics", "", "Kinematic walks cannot check these statements; docs/concepts/physics.md does.", "",
+            "## Judged in physics", "", "Kinematic walks cannot check these statements: see docs/results/paper.md.", "",
             *(f"- {row['topic']} (Section 6): {row['text']}; `{row['command']}`" for row in in_physics()),
         ]  # fmt: skip
         return "\n".join(lines) + "\n"
