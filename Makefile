@@ -4,6 +4,7 @@
 # make bench      every speed beside a peer, under ten minutes; ARGS="..." goes to pytest
 # make lint       style and types
 # make docs       the documentation, in results/site; `python3 -m http.server -d results/site` serves it
+# make results    all results and the pages in docs/results; hours
 # make gallery    the documentation's films of walks, in docs/images
 # PYTHON=...      the Python, 3.11 or newer, for .venv
 
@@ -15,7 +16,7 @@ GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 GL = $(if $(findstring libEGL.so.1,$(shell PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p)),egl,disable)
 
-.PHONY: compare test slow bench lint docs gallery system browser
+.PHONY: compare test slow bench lint docs results gallery system browser
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
@@ -41,6 +42,13 @@ lint: .venv/dev
 
 docs: .venv/dev
 	NO_MKDOCS_2_WARNING=1 .venv/bin/python -m mkdocs build --quiet --strict
+
+results: bench
+	.venv/bin/python -m benchmarks.scaling
+	.venv/bin/hexmj biology --processes 2
+	.venv/bin/hexmj reproduce --beside lasting --processes 2
+	.venv/bin/hexmj league --processes 2 --no-video
+	.venv/bin/python docs/results.py
 
 gallery: .venv/project system
 	.venv/bin/python examples/gallery.py docs/images

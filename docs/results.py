@@ -1,0 +1,183 @@
+"""Write the tables and figures of the pages in docs/results: `python docs/results.py [FOLDER]`, by default `results`.
+
+`make results` computes what it reads. The table of a page stands between two comments; the text around it is written by
+hand and quotes the table. A page without results in the folder stays as it is.
+"""
+
+import json
+import re
+import shutil
+import sys
+from collections.abc import Sequence
+from itertools import groupby
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import hexmj
+from hexmj import io
+from hexmj.plotting import as_shipped
+from hexmj.studies.biology import ANIMALS, biology_figure, table_rows, walked_in_words
+from hexmj.studies.league_figure import league_figure, walks_figure
+from hexmj.studies.standings import by_rank, frequency, place
+
+PAGES = Path(__file__).parent / "results"
+IMAGES = Path(__file__).parent / "images"
+BEGIN, END = "<!-- table -->\n", "<!-- end of the table -->"
+SEED, N_STARTS = 1998, 7000
+"""Random starts of `hexmj reproduce`, from which the FLSS of our own weight sets is computed too."""
+
+VARIED = re.compile(r", (front|middle|hind)\b| at (\d+ mm/s)")
+"""Part of a quantity's name in which neighbouring rows of `hexmj biology` differ; such rows become one."""
+
+STEP = "step"
+"""Trial of the league that has a column of its own."""
+
+
+def table(head: str, rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table without blanks around its cells; the cells of the head are separated by '|'."""
+    cells = [head.split("|"), ["---"] * (head.count("|") + 1), *rows]
+    return "".join(f"|{'|'.join(cell.replace('|', chr(92) + '|') for cell in row)}|\n" for row in cells)
+
+
+def number(value: float, low: float, high: float) -> str:
+    """Return a value with its 95 % interval, three digits after the point."""
+    texts = [f"{x:.3f}".replace("-0.000", "0.000") for x in (value, low, high)]
+    return "no value" if value != value else texts[0] + (f" ({texts[1]} to {texts[2]})" if texts[1] < texts[2] else "")
+
+
+def alike(texts: Sequence[str]) -> str:
+    """Return texts as one cell, or one of them if all are the same; intervals without a minus become shorter."""
+    text = "; ".join({*texts} if len({*texts}) == 1 else texts)
+    return re.sub(r"(?<![-\d.])([\d.]+) to (?=\d)", r"\1-", text)
+
+
+def paper(folder: Path) -> list[str]:
+    """Return tables of agreeing claims, all claims and our own weight sets, and copy figures of `hexmj reproduce`."""
+    claims = json.loads((folder / "claims.json").read_text(encoding="utf-8"))["claims"]
+    for name, drawn in {"paper_flss": "figure-4-walk", "paper_phases": "figure-5"}.items():
+        shutil.copyfile(folder / "figures" / f"{drawn}.png", IMAGES / f"{name}.png")
+    return [_agreeing(claims), _claims(claims), _own_sets()]
+
+
+def _agreeing(claims: list[dict[str, Any]]) -> str:
+    counts = []
+    for variant, time in (("", "walk"), ("", "start"), ("lasting", "walk"), ("lasting", "start")):
+        agree = [claim for claim in claims if _answer(claim, time, variant)["verdict"] == "agrees"]
+        held_out, of = (sum(not claim["calibrates"] for claim in some) for some in (agree, claims))
+        counts.append([variant or "printed", time, f"{held_out} of {of}", f"{len(agree)} of {len(claims)}"])
+    return table("model variant|observation time|held-out claims that agree|all claims that agree", counts)
+
+
+def _claims(claims: list[dict[str, Any]]) -> str:
+    rows, before = [], ""
+    for (section, text, printed), group in groupby(claims, _without_network):
+        both, values, wheres, verdicts = [*group], [], [], []
+        for claim in both:
+            network = claim["paper"].rpartition(", ")[2]
+            ours = _answer(claim, "walk")
+            said = number(*(nan if ours[key] is None else ours[key] for key in ("value", "low", "high")))
+            values.append(f"{network} {said}" if len(both) > 1 else said)
+            wheres.append(ours["where"].removeprefix("V = "))
+            calibrated = "\\*" if claim["calibrates"] else ""
+            verdicts.append(("agrees" if ours["verdict"] == "agrees" else f"**{ours['verdict']}**") + calibrated)
+        differ = [claim for claim in both if _answer(claim, "walk")["verdict"] != "agrees"]
+        why = (differ[0]["why"] or "unknown") if differ else ""
+        text = text if len(both) > 1 else both[0]["paper"]
+        again = "as above" if why == before else why
+        rows.append([section, text, printed, *map(alike, (values, wheres, verdicts)), again if why else ""])
+        before = why or before
+    return table("section|claim|paper|hexmj|at V|verdict|reason", rows)
+
+
+def _without_network(claim: dict[str, Any]) -> tuple[str, str, str]:
+    """Return section, text and value of a claim; neighbours that differ in the network alone become one row."""
+    text, _, network = claim["paper"].rpartition(", ")
+    return claim["section"], text if network in ("HWS", "LDVS") else claim["paper"], claim["value"]
+
+
+def _answer(claim: dict[str, Any], time: str, variant: str = "") -> dict[str, Any]:
+    """Return the answer to a claim for an observation time; claims on gaits have one answer for both."""
+    answers = claim["beside"][variant] if variant else claim["ours"]
+    return answers.get(time) or answers["any"]
+
+
+def _own_sets() -> str:
+    rows = []
+    for v in np.linspace(0.1, 0.9, 9).round(1).tolist():
+        names = "uncoordinated", "hws", "ldvs", "own", f"own-{v}"
+        every = [hexmj.flss(hexmj.load_controller(name), [v], n_starts=N_STARTS, seed=SEED) for name in names]
+        rows.append([f"{v}", *(f"{one.flss.item():.4f}" for one in every)])
+    return table("V|uncoordinated|HWS|LDVS|`own`|`own-V`", rows)
+
+
+def league(folder: Path) -> list[str]:
+    """Return the table of the league, the fewest falls first, and draw its two figures."""
+    result = io.load(folder / "league.nc")
+    with as_shipped():
+        io.save_figure(league_figure(result), IMAGES / "league.png")
+        io.save_figure(walks_figure(result), IMAGES / "league_walks.png")
+    rows = []
+    for name in by_rank(result).entrant.values:
+        own = result.sel(entrant=name)
+        middle = own.sel(velocity=0.5, method="nearest")
+        tried = own.sel(velocity=result.attrs["trial_velocity"], method="nearest")
+        means = [
+            f"{own[measure].mean('velocity').item():.2f}{place(own.sel(measure=measure))}"
+            for measure in ("kinematic", "physical")
+        ]
+        at_half = [frequency(middle, measure) for measure in ("kinematic", "physical")]
+        others = [f"{middle.stable.item():.2f}", frequency(own.sel(trial=STEP), "fell"), f"{tried.cost.item():.2f}"]
+        rows.append([name, *(text.replace("nan", "-") for text in (*means, *at_half, *others))])
+    head = "controller|FLSS, mean (rank)|falls, mean (rank)|FLSS, V = 0.5|falls, V = 0.5"
+    return [table(f"{head}|stable gaits, V = 0.5|falls, step|cost of transport", rows)]
+
+
+def biology(folder: Path) -> list[str]:
+    """Return the rows with a figure of insects, and draw the figure."""
+    result = io.load(folder / "biology.nc")
+    with as_shipped():
+        io.save_figure(biology_figure(result), IMAGES / "biology.png")
+    known = [row for row in table_rows(result) if row[2] != "-"]
+    rows = []
+    for (name, source), group in groupby(known, lambda row: (VARIED.sub("", row[0]), row[4])):
+        each = [*group]
+        varied = [found[1] or found[2] for row in each if (found := VARIED.search(row[0]))]
+        values, insects, verdicts = map(alike, [*zip(*each, strict=True)][1:4])
+        rows.append([f"{name}{': ' * bool(varied)}{', '.join(varied)}", values, insects, verdicts, source])
+    without = len(ANIMALS) - len(known)
+    note = f"\n{without} more rows have no figure of insects. Whole strides: {walked_in_words(result)}.\n"
+    return [table("quantity|hexmj (95 %)|insects|verdict|source", rows) + note]
+
+
+def speed(folder: Path) -> list[str]:
+    """Return the ratios of `make bench`, without the speeds of the machine."""
+    lines = (folder / "table.md").read_text(encoding="utf-8").splitlines()
+    if (folder / "scaling.png").exists():
+        shutil.copyfile(folder / "scaling.png", IMAGES / "scaling.png")
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[4:]]
+    rows = [[what, peer.rpartition(": ")[0], ratio] for what, _, _, peer, ratio in cells]
+    return [table("what|peer|ratio", rows)]
+
+
+def main() -> None:
+    """Write every page whose results are in the folder."""
+    results = Path(sys.argv[1] if len(sys.argv) > 1 else "results")
+    folders = {paper: "reproduce", league: "league", biology: "biology", speed: "bench"}
+    for write, name in folders.items():
+        page = PAGES / f"{write.__name__}.md"
+        try:
+            tables = iter(write(results / name))
+        except FileNotFoundError as error:
+            print(f"{page.name} stays: {error.filename} does not exist")
+            continue
+        before, *parts = page.read_text(encoding="utf-8").split(BEGIN)
+        text = before + "".join(BEGIN + next(tables) + END + part.partition(END)[2] for part in parts)
+        page.write_text(text, encoding="utf-8")
+        print(f"{page.name}: {len(text.split())} words")
+
+
+if __name__ == "__main__":
+    main()
