@@ -20,14 +20,24 @@ from hexmj.cli import main
 from hexmj.controllers.conformance import check_controller
 
 ROOT = Path(__file__).parents[1]
-FILES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md"))]
-PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in FILES}
+NOTEBOOKS = sorted((ROOT / "docs/tutorials").glob("*.ipynb"))
+FILES = [*(ROOT / name for name in ("README.md", "CONTRIBUTING.md")), *sorted(ROOT.glob("docs/**/*.md")), *NOTEBOOKS]
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a page; of a notebook, only its Markdown."""
+    text = path.read_text(encoding="utf-8")
+    if path not in NOTEBOOKS:
+        return text
+    return "\n\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"] if cell["cell_type"] == "markdown")
+
+
+PAGES = {path.relative_to(ROOT).as_posix(): text_of(path) for path in FILES}
 LINES = dict.fromkeys(re.findall(r"^    hexmj (.+?)(?: +# (.+))?$", "\n".join(PAGES.values()), flags=re.MULTILINE))
 COMMANDS = [command for command, comment in LINES if not comment.startswith("long")]
 EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
 LONG_EXAMPLES = {"gallery", "model_variants", "servo_hexapod", "train_cma", "train_ppo", "variants"}
 """Examples that take minutes. Their functions are tested at a small size, here, in test_learned or by features.py."""
-NOTEBOOKS = sorted((ROOT / "docs/tutorials").glob("*.ipynb"))
 
 
 def blocks(page: str) -> list[str]:
@@ -141,6 +151,12 @@ def test_targets_extras_and_links_exist():
             assert (ROOT / page).parent.joinpath(link).exists(), (page, link)
     named = {path for path in re.findall(r"\b(?:docs|examples|benchmarks|tests|hexmj)/[\w/]+\.(?:py|md|png)", text)}
     assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
+
+
+def test_the_reference_has_each_public_name_once():
+    places = re.findall(r"^::: (\S+)", "\n".join(PAGES.values()), flags=re.MULTILINE)
+    assert len(places) == len(set(places))
+    assert {f"hexmj.{name}" for name in hexmj.__all__} - set(places) == {"hexmj.__version__"}
 
 
 @pytest.mark.slow

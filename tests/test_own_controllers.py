@@ -1,6 +1,5 @@
 """The examples' controllers: interface, both measures, and bodies that follow the plan."""
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,7 +20,6 @@ from hexmj.walks import PlannedWalk
 from tiers import few_of
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-GUIDE = EXAMPLES.parent / "docs/your_own_controller.md"
 OWN = {
     "tripod": f"{EXAMPLES / 'tripod.py'}:Tripod",
     "feeler": f"{EXAMPLES / 'contact_controller.py'}:Feeler",
@@ -57,14 +55,6 @@ def test_both_measures_beside_ldvs(own):
     alone = hexmj.physical_flss(own, [0.4], n_starts=12, observation_time=80.0)
     assert alone.flss.item() == physical[0]
     assert hexmj.settings(alone)["controllers"][own.name]["name"] == own.name
-
-
-def test_the_guide_shows_the_example():
-    """And its file alone is a controller."""
-    code, test = re.findall(r"```python\n(.+?)```", GUIDE.read_text(encoding="utf-8"), flags=re.DOTALL)
-    shown = code.replace("from hexmj.controllers", "import hexmj\nfrom hexmj.controllers").strip()
-    assert shown in (EXAMPLES / "tripod.py").read_text(encoding="utf-8")
-    assert "check_controller(Tripod())" in test
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """`hexmj reproduce`: measure what the paper's claims need, judge every claim, and draw the figures."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -61,8 +61,7 @@ class Row:
         claim, cells = self.claim, []
         for answers in (self.answers, *self.beside.values()):
             cells += [*map(_cell, answers.values()), "same"][: len(OBSERVATION_TIMES)]
-        kind = "; ".join(claim.calibrates)
-        kind = f"{claim.kind}: {kind}" if kind else claim.kind
+        kind = ": ".join(filter(None, (claim.kind, "; ".join(claim.calibrates))))
         return claim.section, claim.text, claim.value, kind, *cells, self.fits, self.why
 
 
@@ -169,7 +168,7 @@ def reproduce(
         choice("claim", key, claims())
     if not only and protocol.samples != SAMPLES:
         raise InputError(f"samples = {protocol.samples}; expected {SAMPLES}, which the figures need")
-    variants = {name: named_variant(name) for name in beside}
+    variants = {name: replace(protocol, model_variant=named_variant(name)) for name in beside}
     out = io.results_folder(out)
     judged = [claim for key, claim in claims().items() if not only or key in only]
     needed = {name for claim in judged for name in claim.rule.quantity.needs}
@@ -178,14 +177,8 @@ def reproduce(
         how: Execution = execution | {"progress": part_of(progress, 1 / (1 + len(variants)))}
         names = needed | {name for needs, _ in drawn.values() for name in needs}
         measured = measure(names, protocol, out / MEASURED, **how)
-        others = {
-            name: measure(needed, replace(protocol, model_variant=variant), out / MEASURED, **how)
-            for name, variant in variants.items()
-        }
-    rows = [
-        Row(claim, claim.answers(measured), {name: claim.answers(other) for name, other in others.items()})
-        for claim in judged
-    ]
+        others = {name: measure(needed, variant, out / MEASURED, **how) for name, variant in variants.items()}
+    rows = [Row(c, c.answers(measured), {name: c.answers(other) for name, other in others.items()}) for c in judged]
     report = Report(rows, protocol)
     report.files.append(write_text(out / "claims.md", report.markdown()))
     report.files.append(write_text(out / "claims.json", io.json_text(report.json()) + "\n"))
@@ -198,14 +191,11 @@ def reproduce(
 
 
 def measure(
-    names: set[str] | Sequence[str],
-    protocol: Protocol,
-    folder: Path | str | None = None,
-    **execution: Unpack[Execution],
+    names: Container[str], protocol: Protocol, folder: Path | None = None, **how: Unpack[Execution]
 ) -> Measured:
-    """Compute the named `MEASUREMENTS` in one sweep; `folder` and `execution` are arguments of `run_cells`."""
+    """Compute the named `MEASUREMENTS` in one sweep; `folder` and `how` are arguments of `run_cells`."""
     parts = {name: cells(name, protocol) for name in MEASUREMENTS if name in names}
-    results = iter(run_cells([cell for part in parts.values() for cell in part.values()], folder, **execution))
+    results = iter(run_cells([cell for part in parts.values() for cell in part.values()], folder, **how))
     data: Mapping[str, xr.Dataset] = {
         name: over_axes({"velocity": len(part)}, [*islice(results, len(part))], combine_attrs="drop").assign_coords(
             velocity=("velocity", list(part), VELOCITY)
@@ -234,7 +224,4 @@ def summary(rows: Sequence[Row]) -> list[str]:
 
 def _plain(answers: Answers) -> dict[str, dict[str, Any]]:
     """Return verdict and numbers for each observation time as plain data."""
-    return {
-        time or "any": {"verdict": verdict(answer)} | (asdict(answer) if answer else {})
-        for time, answer in answers.items()
-    }
+    return {time or "any": {"verdict": verdict(a)} | (asdict(a) if a else {}) for time, a in answers.items()}
