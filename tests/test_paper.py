@@ -47,7 +47,7 @@ TINY = replace(
 
 
 def lost(name: str, protocol: Protocol, **how: Any) -> xr.DataArray:
-    return measure([name], protocol, **how).data[name].lost
+    return measure({name}, protocol, **how).data[name].lost
 
 
 def test_claims_name_measurements_and_the_protocol_is_the_papers():
@@ -199,7 +199,7 @@ def test_a_cell_holds_only_what_its_numbers_depend_on():
 
 
 def test_measurements_do_not_depend_on_the_executor(tmp_path: Path):
-    names = ["hws", "ideal", "hws footfall"]
+    names = {"hws", "ideal", "hws footfall"}
     with ThreadPoolExecutor(2) as executor:
         parallel = measure(names, TINY, executor=executor)
     alone = measure(names, TINY, tmp_path, threads=1)

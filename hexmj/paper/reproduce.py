@@ -1,7 +1,7 @@
 """`hexmj reproduce`: measure what the paper's claims need, judge every claim, and draw the figures."""
 
 from collections import Counter
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -190,9 +190,7 @@ def reproduce(
     return report
 
 
-def measure(
-    names: Container[str], protocol: Protocol, folder: Path | None = None, **how: Unpack[Execution]
-) -> Measured:
+def measure(names: set[str], protocol: Protocol, folder: Path | None = None, **how: Unpack[Execution]) -> Measured:
     """Compute the named `MEASUREMENTS` in one sweep; `folder` and `how` are arguments of `run_cells`."""
     parts = {name: cells(name, protocol) for name in MEASUREMENTS if name in names}
     results = iter(run_cells([cell for part in parts.values() for cell in part.values()], folder, **how))
