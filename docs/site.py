@@ -136,7 +136,7 @@ def meaning(text: str) -> tuple[str, str]:
 def number(value: Any, unit: str) -> str:
     """Return a default with its unit."""
     text = np.format_float_positional(value, trim="-") if isinstance(value, float) else getattr(value, "name", value)
-    return f"{text} {unit}".strip()
+    return f"{text} {unit.removeprefix('1 ')}".strip()
 
 
 def settings(kind: type, limits: Mapping[str, tuple[float, float, bool]] = {}) -> str:
@@ -165,8 +165,8 @@ def recorded() -> str:
     return "\n\n".join(
         f"## {titles[title]}\n\n"
         + table(
-            ("variable", "dimensions", "unit", "meaning"),
-            ((f"`{name}`", ", ".join(dims) or "one number", unit, text) for name, (dims, unit, text) in rows.items()),
+            ("variable", "meaning", "unit", "dimensions"),
+            ((f"`{name}`", text, unit, ", ".join(dims) or "one number") for name, (dims, unit, text) in rows.items()),
         )
         for title, rows in tables
     )
