@@ -23,7 +23,7 @@ from mkdocs.structure.pages import Page
 import hexmj
 from hexmj.bodies.kinematics import joint_numbers, posed
 from hexmj.bodies.mjcf import plain_model
-from hexmj.body import JOINTS, PARTS
+from hexmj.body import PARTS
 from hexmj.cli.main import HELP, command
 from hexmj.conditions import Conditions, ranges
 from hexmj.controllers.baselines import BASELINES
@@ -79,12 +79,8 @@ def commands() -> str:
     groups = [block.split("\n") for block in HELP.split("\n\n") if "\n  " in block]
     named = [(title, [line.split(maxsplit=1) for line in lines]) for title, *lines in groups]
     rows = ((f"[{name}](#hexmj-{name})", text) for _, lines in named for name, text in lines)
-    return "\n\n".join(
-        [
-            table(("command", "what it does"), rows),
-            *(part for title, lines in named for part in (f"## {title}", *(one_command(name) for name, _ in lines))),
-        ]
-    )
+    parts = (part for title, lines in named for part in (f"## {title}", *(one_command(name) for name, _ in lines)))
+    return "\n\n".join([table(("command", "what it does"), rows), *parts])
 
 
 def one_command(name: str) -> str:
@@ -102,12 +98,9 @@ def one_command(name: str) -> str:
         options = "\n\n".join(option(part) for part in fields(kind))
         title = FOLDED.get(member.name) if member.name != name else None
         parts.append(f'??? note "{title}"\n\n{indent(options, "    ")}' if title else options)
-    lines = [
-        f"hexmj {name} [OPTIONS]{positional}",
-        "",
-        *(f"hexmj {name} {words}".rstrip() for words in chosen.examples),
-    ]
-    return "\n\n".join([f"### hexmj {name}", summary, "\n".join(["```text", *lines, "```"]), *parts])
+    examples = "\n".join(f"hexmj {name} {words}".rstrip() for words in chosen.examples)
+    usage = f"```text\nhexmj {name} [OPTIONS]{positional}\n\n{examples}\n```"
+    return "\n\n".join([f"### hexmj {name}", summary, usage, *parts])
 
 
 def config_of(member: Any) -> Any:
@@ -160,16 +153,15 @@ def outcomes() -> str:
 
 def recorded() -> str:
     """Return the variables of a recording."""
-    tables = [(title, getattr(recording, title)) for title in ("TIMES", "PLANNED", "MEASURED")]
-    titles = {"TIMES": "Coordinates", "PLANNED": "In every recording", "MEASURED": "Only in physical walks"}
-    return "\n\n".join(
-        f"## {titles[title]}\n\n"
-        + table(
-            ("variable", "meaning", "unit", "dimensions"),
-            ((f"`{name}`", text, unit, ", ".join(dims) or "one number") for name, (dims, unit, text) in rows.items()),
-        )
-        for title, rows in tables
-    )
+    parts = []
+    for title, variables in (
+        ("Coordinates", recording.TIMES),
+        ("In every recording", recording.PLANNED),
+        ("Only in physical walks", recording.MEASURED),
+    ):
+        rows = ((f"`{v}`", text, unit, ", ".join(dims) or "one number") for v, (dims, unit, text) in variables.items())
+        parts += [f"## {title}", table(("variable", "meaning", "unit", "dimensions"), rows)]
+    return "\n\n".join(parts)
 
 
 def baselines() -> str:
@@ -213,28 +205,20 @@ def insect() -> str:
     places = np.concatenate([data.xanchor[numbers], [[data.site(leg.foot).xpos] for leg in body.legs[:3]]], axis=1)
     lengths = np.linalg.norm(np.diff(places, axis=1), axis=-1)
     ranges = np.rad2deg(model.jnt_range[numbers]).round()
-    legs, rows = ("front", "middle", "hind"), []
-    for leg, which in enumerate(legs):
-        masses = [1000 * model.body(part).mass.item() for part in body.legs[leg].parts]
-        cells = [f"{a:.1f} mm, {b:.1f} mg" for a, b in zip(lengths[leg], masses, strict=True)]
-        rows.append((which, *cells))
-    spans = [(legs[leg], *(f"{low:g} to {high:g}" for low, high in ranges[leg])) for leg in range(3)]
-    trunk = [(part, f"{1000 * model.body(part).mass.item():.0f} mg") for part in body.trunk]
-    return "\n\n".join(
-        [
-            table(("leg", *PARTS), rows),
-            table(("leg", *(f"{name} [degrees]" for name in JOINTS)), spans),
-            table(("part of the trunk", "mass"), trunk),
-        ]
-    )
+    legs, trunk = [], [(part, f"{1000 * model.body(part).mass.item():.0f} mg") for part in body.trunk]
+    for leg, which in enumerate(("front", "middle", "hind")):
+        for part, name, length, (low, high) in zip(body.legs[leg].parts, PARTS, lengths[leg], ranges[leg], strict=True):
+            mass = 1000 * model.body(part).mass.item()
+            legs.append((f"{which} {name}", f"{length:.1f} mm", f"{mass:.1f} mg", f"{low:g} to {high:g} degrees"))
+    heads = ("part of a leg", "length", "mass", "range of its joint")
+    return "\n\n".join([table(heads, legs), table(("part of the trunk", "mass"), trunk)])
 
 
 def examples() -> str:
     """Return the scripts in `examples/` with the first line of their docstrings."""
-    first = (
-        (path.name, ast.get_docstring(ast.parse(path.read_text())) or "") for path in sorted(ROOT.glob("examples/*.py"))
-    )
-    return table(("script", "what it shows"), ((f"`{name}`", text.partition("\n")[0]) for name, text in first))
+    trees = {path.name: ast.parse(path.read_text()) for path in sorted(ROOT.glob("examples/*.py"))}
+    rows = ((f"`{name}`", (ast.get_docstring(tree) or "").partition("\n")[0]) for name, tree in trees.items())
+    return table(("script", "what it shows"), rows)
 
 
 def from_root(name: str) -> str:
