@@ -38,6 +38,7 @@ from .replay.recording import load_recording as load_recording
 from .replay.recording import record as record
 from .replay.recording import record_plan as record_plan
 from .replay.recording import save_recording as save_recording
+from .replay.table import Recording as Recording
 from .replay.video import render as render
 from .search.forms import FieldsForm as FieldsForm
 from .search.forms import NetworkForm as NetworkForm

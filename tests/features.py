@@ -152,6 +152,15 @@ def shown(line: str) -> Any:
     return result | {"size": next(pictures)["size"], "pictures": sum(1 for _ in pictures)}
 
 
+def exported() -> Any:
+    """List the columns of a recording, and write two recordings as CSV; return the numbers of the first file."""
+    recordings()
+    result = answer("export walk.nc plan.nc --csv")
+    numbers = np.genfromtxt(result["files"][0], delimiter=",", skip_header=1)
+    sizes = {table["recording"]: [table["rows"], len(table["columns"])] for table in result["tables"]}
+    return {"sizes": sizes, "files": result["files"], "numbers": numbers, "text": text("export plan.nc")}
+
+
 def scheduler(line: str) -> Any:
     from distributed import LocalCluster
 
@@ -172,7 +181,7 @@ def reproduce() -> Any:
 @cache
 def recordings() -> Any:
     """Save the recordings `walk.nc` and `plan.nc`; return the first one."""
-    walk = hexmj.physical_walk(hexmj.draw_starts(2, seed=3), hexmj.UNCOORDINATED, 0.5, 30.0)
+    walk = hexmj.physical_walk(hexmj.draw_starts(2, seed=3), hexmj.UNCOORDINATED, 0.5, 30.0, forces=True)
     hexmj.save_recording(hexmj.record(walk, 0, title="walk"), Path("walk.nc"))
     plan = hexmj.record_plan(walk.planned, walk.conditions, hexmj.Stride(), start=1, title="plan")
     hexmj.save_recording(plan, Path("plan.nc"))
@@ -334,6 +343,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     ),
     "render beside": lambda: shown(f"render {FILM} --velocity 0.5 --observation-time 8 --beside hws --camera front"),
     "page": lambda: [shown("page walk.nc"), shown("page walk.nc plan.nc")],
+    "export": exported,
     "view live": lambda: view("--velocity 0.5"),
     "view recording": lambda: view("walk.nc"),
     "view session": view_session,

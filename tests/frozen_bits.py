@@ -143,7 +143,7 @@ def searched(seed: int) -> Arrays:
 
 def recorded(seed: int) -> Arrays:
     starts = hexmj.draw_starts(2, seed)
-    walked = hexmj.physical_walk(starts, hexmj.LDVS, 0.5, 60.0)
+    walked = hexmj.physical_walk(starts, hexmj.LDVS, 0.5, 60.0, forces=True)
     planned = hexmj.walk(starts, hexmj.LDVS, 0.5, 60.0)
     puppet = hexmj.record_plan(planned, walked.conditions, walked.stride, start=1)
     both = {"walk": hexmj.record(walked, 1), "puppet": puppet}

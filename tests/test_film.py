@@ -22,11 +22,11 @@ from hexmj.controllers.cruse1998 import UNCOORDINATED
 from hexmj.errors import InputError, RenderingError
 from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.rendering import gl
-from hexmj.replay.film import Film, write_film
+from hexmj.replay.film import Film
 from hexmj.replay.overlay import Overlay
 from hexmj.replay.recording import record, record_plan
 from hexmj.replay.take import Take, margin_in_words, walk_figure
-from hexmj.replay.video import _view, render
+from hexmj.replay.video import _view, render, write_film
 from hexmj.starts import draw_starts
 
 DURATION = 24.0  # time units, 0.3 s

@@ -25,6 +25,7 @@ Walk and measure
 Look
   render            a video of recordings, or of a walk that is recorded first
   page              an HTML file that plays recordings without a network
+  export            joint angles, torques, forces and tips of recordings as CSV
   view              a walk or a recording in a window or a browser
 
 Studies
@@ -53,7 +54,7 @@ Machine
 
 MODULES = {
     "measures": ("walk", "flss", "compare"),
-    "pictures": ("render", "page", "view"),
+    "pictures": ("render", "page", "export", "view"),
     "studies": ("map", "disturb", "terrain", "converge", "biology"),
     "controllers": ("league", "ablate", "search", "check-controller"),
     "paper": ("reproduce",),

@@ -1,4 +1,4 @@
-"""`hexmj render`, `hexmj page` and `hexmj view`."""
+"""`hexmj render`, `hexmj page`, `hexmj export` and `hexmj view`."""
 
 import re
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from hexmj.cli.command import Answer, Command
 from hexmj.cli.measures import PHYSICAL
 from hexmj.cli.options import Output, Planning, Threads, build, controller, no_effect
-from hexmj.cli.output import show
+from hexmj.cli.output import show, table
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, RenderingError
@@ -18,9 +18,7 @@ from hexmj.replay.film import MOST_PANELS, Film
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from hexmj.replay.recording import Start
+    from hexmj.replay.recording import Recording, Start
 
 WALKS: dict[str, Any] = {"controller": "ldvs", "velocity": 0.3, "seed": 0, "start": 0, "beside": None}
 """Option that has no effect on recordings -> its default."""
@@ -84,7 +82,7 @@ class Render(Command):
         return Answer(summary, [line], [*files, video], settings, f"{video.name}-{MANIFEST}")
 
 
-def _recorded(start: "Start", given: SimpleNamespace) -> "list[xr.Dataset]":
+def _recorded(start: "Start", given: SimpleNamespace) -> "list[Recording]":
     """Record the walk, and the plan or the walk of the second controller that --beside asks for."""
     from hexmj.replay.recording import Start, record, record_plan
 
@@ -137,6 +135,50 @@ class Page(Command):
         line = f"{file.stat().st_size / 1e6:.1f} MB; open the file in any browser"
         summary = {"recordings": [*map(recording_summary, shown)]}
         return Answer(summary, [line], [file], settings, f"{file.name}-{MANIFEST}")
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Options of `hexmj export`."""
+
+    recordings: tuple[Path, ...] = ()
+    """One or more recordings (recording.nc of `hexmj walk`)."""
+    csv: bool = False
+    """Write the table of each recording as CSV. Without this option, the command lists the columns of the table."""
+    out: Path | None = None
+    """Folder for the CSV files; by default each file is beside its recording."""
+
+
+class Export(Command):
+    """Export recordings as tables with one row for each step of the plan: joint angles and torques, ground forces,
+    contacts, tips, stability margins and the pose of the root."""
+
+    sources = (ExportOptions, Output)
+    positional = "recordings"
+    examples = ("results/walk/recording.nc", "results/walk/recording.nc --csv")
+
+    def run(self, given: SimpleNamespace) -> Answer:
+        from hexmj.io import results_folder
+        from hexmj.replay.recording import load_recording
+
+        if not given.recordings:
+            raise InputError("no recordings; expected one or more, as `hexmj walk` writes them")
+        if not given.csv:
+            no_effect(given, ["out"], "without --csv", {"out": None})
+        recordings = [load_recording(path) for path in given.recordings]
+        out = given.out and results_folder(given.out)
+        files = [(out or path.parent) / f"{path.stem}.csv" for path in given.recordings] if given.csv else []
+        if len(set(files)) < len(files):
+            raise InputError("two recordings would be written to the same file; expected distinct file names")
+        for file, recording in zip(files, recordings, strict=given.csv):
+            recording.to_csv(file)
+        lines, tables = [], []
+        for path, recording in zip(given.recordings, recordings, strict=True):
+            columns, rows = [(name, *about[:2]) for name, about in recording.columns().items()], recording.sizes["step"]
+            lines.append(f"{path}: {rows} rows, {len(columns)} columns")
+            lines += [] if given.csv else [table(("name", "unit", "meaning"), columns)]
+            tables.append({"recording": path, "rows": rows, "columns": columns})
+        return Answer({"tables": tables}, lines, files)
 
 
 @dataclass(frozen=True)

@@ -170,12 +170,14 @@ class WalkSoFar(OutcomesSoFar):
     """Stores the walks of all starts, chunk by chunk, for `PhysicalWalk`, and adds up their outcomes."""
 
     def __init__(self, settled: Settled, planned: PlannedWalk, threads: int | None = None) -> None:
-        """Begin with the plan of the whole walk."""
+        """Begin with the plan of the whole walk; a body with sensors of the feet's forces also stores forces."""
         super().__init__(settled, loss_time(planned, threads=threads))
-        shape = steps, starts, _ = planned.stance.shape
-        (x, y, self.height, self.load), stance = np.full((4, *shape), np.nan), np.zeros(shape, dtype=bool)
-        self.qpos = np.full((steps, starts, settled.compiled.model.nq), np.nan)
-        self.centre_of_mass = np.full((steps, starts, 3), np.nan)
+        shape, compiled = planned.stance.shape, settled.compiled
+        axes = {"height": (6,), "load": (6,), "qpos": (compiled.model.nq,), "centre_of_mass": (3,)}
+        if compiled.columns.feet_push.stop > compiled.columns.feet_push.start:
+            axes |= {"torque": (compiled.joints,), "ground_force": (6, 3)}
+        self.kept: dict[str, Any] = {name: np.full((*shape[:2], *own), np.nan) for name, own in axes.items()}
+        (x, y), stance = np.full((2, *shape), np.nan), np.zeros(shape, dtype=bool)
         self.measured = Walk(planned.time, planned.velocity, x, y, stance, planned.geometry)
 
     def add(self, chunk: Chunk) -> None:
@@ -187,13 +189,14 @@ class WalkSoFar(OutcomesSoFar):
         at = np.ix_((chunk.first + columns) // self._settled.substeps - 1, chunk.ids)
         for name in ("x", "y", "stance"):
             getattr(self.measured, name)[at] = getattr(seen, name)
-        self.centre_of_mass[at] = centre
-        for kept, values in (
-            (self.height, -compiled.depth(feet)),
-            (self.load, chunk.load[:, columns]),
-            (self.qpos, chunk.qpos[:, columns]),
-        ):
-            kept[at] = np.where(over[..., None], np.nan, values.swapaxes(0, 1))
+        found = {name: getattr(chunk, name)[:, columns] for name in ("load", "qpos", "torque") if name in self.kept}
+        if "ground_force" in self.kept:
+            found["ground_force"] = -sensors[..., compiled.columns.feet_push].reshape(feet.shape)
+            found["ground_force"][..., 2] -= sensors[..., compiled.columns.touch] - found["load"]  # adhesion
+        found |= {"height": -compiled.depth(feet), "centre_of_mass": centre.swapaxes(0, 1)}
+        for name, values in found.items():
+            values.swapaxes(0, 1)[over] = np.nan
+            self.kept[name][at] = values.swapaxes(0, 1)
 
 
 def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:

@@ -1,13 +1,9 @@
-"""Settings of a film, and the encoding of its frames as an MP4 or GIF file."""
+"""Settings of a film."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import numpy as np
-
-from hexmj.errors import InputError, RenderingError
+from hexmj.errors import InputError
 from hexmj.validate import choice, number, whole
 
 MOST_PANELS = 6
@@ -15,12 +11,6 @@ MOST_PANELS = 6
 
 FASTEST_GIF = 50
 """Maximum frames per second of a GIF. It stores times in 1/100 s, and players show frames of 1/100 s for 10/100 s."""
-
-ENCODINGS: dict[str, dict[str, Any]] = {
-    ".mp4": {"crf": 20, "ffmpeg_args": "-preset veryfast -movflags +faststart"},
-    ".gif": {"codec": "gif"},
-}
-"""Suffix of a film's name -> options of the encoder."""
 
 
 @dataclass(frozen=True)
@@ -57,24 +47,3 @@ class Film:
         """Raise InputError if the film has more frames per second than the format `name`, "mp4" or "gif", allows."""
         if name == "gif" and self.fps > FASTEST_GIF:
             raise InputError(f"fps = {self.fps:g}; a GIF has at most {FASTEST_GIF} frames per second")
-
-
-def write_film(path: Path, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Encode frames as a film and write its file.
-
-    Args:
-        path: file of the film, with a suffix of `ENCODINGS`.
-        frames: arrays (height, width, 3) of uint8, with even height and width.
-        fps: frames per second.
-
-    Raises:
-        RenderingError: ffmpeg is missing or fails.
-    """
-    import imageio_ffmpeg
-    import mediapy
-
-    try:
-        mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-        mediapy.write_video(path.absolute(), frames, fps=fps, **ENCODINGS[path.suffix])
-    except (OSError, RuntimeError) as error:
-        raise RenderingError(f"ffmpeg failed: {' '.join(str(error).split()):.300}") from None

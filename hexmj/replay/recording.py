@@ -22,6 +22,7 @@ from hexmj.measures.kinematic import walk as planned_walk
 from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.physics.foot_path import TipTargets, hold
 from hexmj.progress import progress_bar
+from hexmj.replay.table import Recording
 from hexmj.rotations import rotated
 from hexmj.stability import loss_time, walk_margin
 from hexmj.starts import draw_start
@@ -43,9 +44,11 @@ PLANNED = {
     "planned_stance": (_LEG, "1", "leg retracts in the plan"),
     "planned_margin": (_STEP, "mm", "stability margin of the plan"),
     "planned_loss_time": (_ONCE, "time unit", "first loss of static stability of the plan, or inf"),
-    "planned_tip": ((*_LEG, "coordinate"), "mm", "commanded tip in the world, lifted while it swings"),
+    "planned_tip": ((*_LEG, "coordinate"), "mm", "commanded tip in the world"),
     "qpos": ((*_STEP, "position"), "mm, 1, rad", "root's position and unit quaternion, joint angles"),
     "centre_of_mass": ((*_STEP, "coordinate"), "mm", "centre of mass in the world"),
+    "joint_angle": ((*_STEP, "joint"), "rad", "angle of the joint"),
+    "tip": ((*_LEG, "coordinate"), "mm", "tip of the leg in the world"),
 }
 """Variable of every recording -> its dimensions, unit and meaning."""
 
@@ -65,8 +68,13 @@ MEASURED = {
     "depth": (_ONCE, "mm", "how deep the deepest foot was in the ground until the fall"),
     "saturation": (_ONCE, "1", "fraction of joints times physics steps at the torque limit"),
     "unreachable": (_ONCE, "1", "tip targets out of reach"),
+    "joint_torque": ((*_STEP, "joint"), "mN mm", "torque of the servo on the joint"),
+    "ground_force": ((*_LEG, "coordinate"), "mN", "force of the ground on the foot"),
 }
 """Further variables of the recording of a physical walk. The recording of a plan has none of them."""
+
+OPTIONAL = ("joint_angle", "tip", "joint_torque", "ground_force")
+"""Variables that recordings of 0.5.0 do not have; the last two need a walk that keeps forces."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +97,10 @@ class Start:
     def walked(self, threads: int | None = None) -> PhysicalWalk:
         """Simulate the physical walk and return it."""
         with progress_bar("walking") as progress:
-            return self._call(physical_walk, conditions=self.conditions, progress=progress, threads=threads)
+            how = {"conditions": self.conditions, "forces": True, "progress": progress, "threads": threads}
+            return self._call(physical_walk, **how)
 
-    def recorded(self, physical: bool, title: str, threads: int | None = None) -> xr.Dataset:
+    def recorded(self, physical: bool, title: str, threads: int | None = None) -> Recording:
         """Return a recording of the physical walk if `physical`, otherwise of the plan."""
         if physical:
             return record(self.walked(threads), title=title)
@@ -110,11 +119,12 @@ class Start:
         return own | walks | {"conditions": self.conditions.settings()}
 
 
-def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
+def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> Recording:
     """Record the physical walk from one start together with its plan. After a fall, poses and measures are NaN.
 
     The planned variables describe the kinematic walk. Only `planned_tip` holds the tips that were commanded in the
-    physical walk; with sensory feedback, these differ from the kinematic tips.
+    physical walk; with sensory feedback, these differ from the kinematic tips. Without the option `forces` of
+    `physical_walk`, the recording has no joint torques and no ground forces.
 
     Args:
         walk: physical walks.
@@ -127,28 +137,24 @@ def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> xr.Dataset:
     planned, measured = one_start(walk.planned, start), one_start(walk.measured, start)
     qpos, outcomes = walk.qpos[:, start], walk.outcomes
     tips, _ = _lifted_tips(one_start(walk.ordered, start), walk.conditions, walk.stride)
+    kept = {"joint_torque": walk.torque, "ground_force": walk.ground_force}
     return _dataset(
-        planned,
-        walk.conditions,
-        walk.stride,
-        title,
+        *(planned, walk.conditions, walk.stride, title),
         planned_tip=qpos[:, None, :3] + rotated(qpos[:, None, 3:7], tips),
-        measured_x=measured.x[:, 0],
-        measured_y=measured.y[:, 0],
-        measured_stance=measured.stance[:, 0],
+        **{f"measured_{name}": getattr(measured, name)[:, 0] for name in ("x", "y", "stance")},
         measured_margin=walk_margin(measured)[:, 0],
         measured_loss_time=outcomes.measured_loss[start],
         fall_time=outcomes.fall[start],
-        fall_part=outcomes.fall_part[start],
-        **{name: getattr(outcomes, name)[start] for name in REPORTED},
+        **{name: getattr(outcomes, name)[start] for name in ("fall_part", *REPORTED)},
         qpos=qpos,
         centre_of_mass=walk.centre_of_mass[:, start],
+        **{name: 1e-3 * values[:, start] for name, values in kept.items() if values is not None},
     )
 
 
 def record_plan(
     plan: PlannedWalk, conditions: Conditions, stride: Stride, start: int = 0, title: str = ""
-) -> xr.Dataset:
+) -> Recording:
     """Record the plan of one start, shown by a body that follows it exactly: a puppet, without physics.
 
     The root moves with V_r at the standing height without tilt, and the joints reach the planned tips. The recorded
@@ -167,16 +173,14 @@ def record_plan(
     Raises:
         InputError: the plan does not begin with its first step, or a leg cannot reach its tip at time 0.
     """
-    planned = one_start(plan, start)
-    steps = len(plan.time)
+    planned, steps = one_start(plan, start), len(plan.time)
     if steps == 0 or not np.allclose(plan.time, np.arange(1, steps + 1) * stride.dt, 1e-9, 0.0):
         raise InputError(f"plan: its {steps} times are wrong; expected {stride.dt:g}, {2 * stride.dt:g}, ...")
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)
     root = np.zeros((steps, ROOT_QPOS))
     root[:, 0] = np.cumsum(planned.velocity[:, 0]) * stride.dt
-    root[:, 2] = conditions.standing_height + compiled.foot_radius
-    root[:, 3] = 1.0
+    root[:, 2:4] = conditions.standing_height + compiled.foot_radius, 1.0
     joints, reachable = compiled.inverse(tips)
     standing, stands = compiled.inverse(first)
     if not stands.all():
@@ -184,15 +188,8 @@ def record_plan(
         raise InputError(f"plan: leg {LEGS[leg]} cannot reach its tip at time 0, {first[leg].round(3).tolist()} mm")
     if not reachable.all():
         hold(joints, standing)
-    return _dataset(
-        planned,
-        conditions,
-        stride,
-        title,
-        planned_tip=root[:, None, :3] + tips,
-        qpos=np.concatenate([root, joints.reshape(steps, -1)], axis=1),
-        centre_of_mass=root[:, :3],
-    )
+    pose = {"qpos": np.concatenate([root, joints.reshape(steps, -1)], axis=1), "centre_of_mass": root[:, :3]}
+    return _dataset(planned, conditions, stride, title, planned_tip=root[:, None, :3] + tips, **pose)
 
 
 def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
@@ -205,15 +202,19 @@ def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
     return write_netcdf(recording, path)
 
 
-def load_recording(path: Path | str) -> xr.Dataset:
+def load_recording(path: Path | str) -> Recording:
     """Read a recording that `save_recording` wrote, with this version of hexmj or with 0.5.0.
+
+    A recording of 0.5.0 gets its joint angles and tips from `qpos`; it has no joint torques and no ground forces.
 
     Raises:
         InputError: the file cannot be read, or is not a recording.
     """
-    recording = read_netcdf(path)
-    check_recording(recording, f"{path}: ")
-    return recording
+    loaded = read_netcdf(path)
+    check_recording(loaded, f"{path}: ")
+    recording = Recording(loaded.data_vars, loaded.coords, loaded.attrs)
+    old = "tip" not in recording and recording.attrs["body"] == STICK_INSECT.name
+    return _with_pose(recording, recorded_conditions(recording)) if old else recording
 
 
 def check_recording(recording: xr.Dataset, where: str = "") -> None:
@@ -221,7 +222,7 @@ def check_recording(recording: xr.Dataset, where: str = "") -> None:
     physical = not MEASURED.keys().isdisjoint(recording.variables)
     variables = TIMES | PLANNED | (MEASURED if physical else {})
     attributes = ["title", *Conditions().settings(), *_stride_settings(Stride())]
-    missing = [name for name in variables if name not in recording.variables]
+    missing = [name for name in variables if name not in {*recording.variables, *OPTIONAL}]
     missing += [name for name in attributes if name not in recording.attrs]
     if missing:
         raise InputError(f"{where}not a recording of hexmj: {', '.join(missing)} missing")
@@ -275,29 +276,39 @@ def _stride_settings(stride: Stride) -> dict[str, Any]:
 
 def _dataset(
     planned: PlannedWalk, conditions: Conditions, stride: Stride, title: str, **values: np.ndarray
-) -> xr.Dataset:
+) -> Recording:
     """Build a recording from the plan of one start; `values` gives the other variables by name."""
     values |= {
         "time": planned.time,
         "seconds": planned.time / conditions.vp,
         "velocity": planned.velocity[:, 0],
-        "planned_x": planned.x[:, 0],
-        "planned_y": planned.y[:, 0],
-        "planned_stance": planned.stance[:, 0],
+        **{f"planned_{name}": getattr(planned, name)[:, 0] for name in ("x", "y", "stance")},
         "planned_margin": walk_margin(planned)[:, 0],
         "planned_loss_time": loss_time(planned)[0],
     }
-
-    def filled(table: dict[str, tuple]) -> dict[str, tuple]:
-        return {
-            name: (dimensions, values[name], {"units": units, "long_name": long_name})
-            for name, (dimensions, units, long_name) in table.items()
-            if name in values
-        }
-
-    coordinates = filled(TIMES) | {"leg": list(LEGS), "coordinate": list("xyz")}
+    coordinates = _filled(TIMES, values) | {"leg": list(LEGS), "coordinate": list("xyz")}
     attributes = {"title": title, **conditions.settings(), **_stride_settings(stride)}
-    return xr.Dataset(filled(PLANNED | MEASURED), coordinates, attributes)
+    recording = Recording(_filled(PLANNED | MEASURED, values), coordinates, attributes)
+    return _with_pose(recording, conditions)
+
+
+def _filled(table: dict[str, tuple], values: dict[str, np.ndarray]) -> dict[str, tuple]:
+    """Return the variables of a table that are in `values`, with unit and meaning as attributes."""
+    return {
+        name: (dimensions, values[name], {"units": units, "long_name": long_name})
+        for name, (dimensions, units, long_name) in table.items()
+        if name in values
+    }
+
+
+def _with_pose(recording: Recording, conditions: Conditions) -> Recording:
+    """Add joint angles and tips, which follow from `qpos`, and the names of the joints."""
+    qpos = recording["qpos"].values
+    angles = qpos[:, ROOT_QPOS:]
+    tips = compile_body(conditions).forward(angles.reshape(len(qpos), len(LEGS), -1))
+    tips = qpos[:, None, :3] + rotated(qpos[:, None, 3:ROOT_QPOS], tips)
+    named = recording.assign_coords(joint=list(conditions.body.joints))
+    return named.assign(_filled(PLANNED, {"joint_angle": angles, "tip": tips}))
 
 
 def _lifted_tips(planned: PlannedWalk, conditions: Conditions, stride: Stride) -> tuple[np.ndarray, np.ndarray]:

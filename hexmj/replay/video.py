@@ -1,10 +1,11 @@
 """Films of recordings: the body, its support polygon, a caption and a footfall diagram."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -18,10 +19,16 @@ from hexmj.files import replacing
 from hexmj.progress import Progress, shown
 from hexmj.rendering import gl
 from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
-from hexmj.replay.film import ENCODINGS, MOST_PANELS, Film, write_film
+from hexmj.replay.film import MOST_PANELS, Film
 from hexmj.replay.overlay import Overlay
 from hexmj.replay.take import Take, takes_of
 from hexmj.validate import choice
+
+ENCODINGS: dict[str, dict[str, Any]] = {
+    ".mp4": {"crf": 20, "ffmpeg_args": "-preset veryfast -movflags +faststart"},
+    ".gif": {"codec": "gif"},
+}
+"""Suffix of a film's name -> options of the encoder."""
 
 BRIGHTER = 1.2
 """Factor on the ground's colour in films without shadows, because MuJoCo renders these darker."""
@@ -72,6 +79,27 @@ def render(
     with shown(progress, "rendering") as advance, replacing(path) as part:
         write_film(part, _frames(takes, overlays, times, film, advance), film.fps)
     return frames
+
+
+def write_film(path: Path, frames: Iterable[np.ndarray], fps: float) -> None:
+    """Encode frames as a film and write its file.
+
+    Args:
+        path: file of the film, with a suffix of `ENCODINGS`.
+        frames: arrays (height, width, 3) of uint8, with even height and width.
+        fps: frames per second.
+
+    Raises:
+        RenderingError: ffmpeg is missing or fails.
+    """
+    import imageio_ffmpeg
+    import mediapy
+
+    try:
+        mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+        mediapy.write_video(path.absolute(), frames, fps=fps, **ENCODINGS[path.suffix])
+    except (OSError, RuntimeError) as error:
+        raise RenderingError(f"ffmpeg failed: {' '.join(str(error).split()):.300}") from None
 
 
 def missing() -> str | None:
@@ -143,14 +171,10 @@ def _view(stage: tuple[gl.Renderer, mujoco.MjData], camera: str, take: Take, row
     mark_support(renderer.scene, marks, corners, level, stable)
     mark_centre_of_mass(renderer.scene, marks, centre, level, stable)
     mark_planned_tips(renderer.scene, marks, take.planned_tip[row])
-    return renderer.render(), _pixels_per_mm(renderer, centre)
-
-
-def _pixels_per_mm(renderer: mujoco.Renderer, point: np.ndarray) -> float:
-    """Return the pixels per mm at a point of the scene, (3,) [mm]; 0 if the point is behind the camera."""
-    camera = renderer.scene.camera[0]
-    ahead = float(np.dot(point - camera.pos, camera.forward))
-    if ahead <= camera.frustum_near:
-        return 0.0
-    distance = camera.frustum_near if camera.orthographic else ahead
-    return renderer.height * camera.frustum_near / ((camera.frustum_top - camera.frustum_bottom) * distance)
+    lens = renderer.scene.camera[0]
+    ahead = float(np.dot(centre - lens.pos, lens.forward))
+    if ahead <= lens.frustum_near:
+        return renderer.render(), 0.0
+    distance = lens.frustum_near if lens.orthographic else ahead
+    scale = renderer.height * lens.frustum_near / ((lens.frustum_top - lens.frustum_bottom) * distance)
+    return renderer.render(), scale
