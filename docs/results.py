@@ -18,6 +18,7 @@ import numpy as np
 
 import hexmj
 from hexmj import io
+from hexmj.paper.claims import claims
 from hexmj.plotting import as_shipped
 from hexmj.studies.biology import ANIMALS, biology_figure, table_rows, walked_in_words
 from hexmj.studies.league_figure import league_figure, walks_figure
@@ -29,6 +30,7 @@ BEGIN, END = "<!-- table -->\n", "<!-- end of the table -->"
 SEED, N_STARTS = 1998, 7000
 """Random starts of `hexmj reproduce`, from which the FLSS of our own weight sets is computed too."""
 
+NETWORK = re.compile(r", (HWS|LDVS)$")
 VARIED = re.compile(r", (front|middle|hind)\b| at (\d+ mm/s)")
 """Part of a quantity's name in which neighbouring rows of `hexmj biology` differ; such rows become one."""
 
@@ -45,7 +47,7 @@ def table(head: str, rows: Sequence[Sequence[str]]) -> str:
 def number(value: float, low: float, high: float) -> str:
     """Return a value with its 95 % interval, three digits after the point."""
     texts = [f"{x:.3f}".replace("-0.000", "0.000") for x in (value, low, high)]
-    return "no value" if value != value else texts[0] + (f" ({texts[1]} to {texts[2]})" if texts[1] < texts[2] else "")
+    return "no value" if value != value else texts[0] + (f" ({texts[1]} to {texts[2]})" if texts[1] != texts[2] else "")
 
 
 def alike(texts: Sequence[str]) -> str:
@@ -56,46 +58,41 @@ def alike(texts: Sequence[str]) -> str:
 
 def paper(folder: Path) -> list[str]:
     """Return tables of agreeing claims, all claims and our own weight sets, and copy figures of `hexmj reproduce`."""
-    claims = json.loads((folder / "claims.json").read_text(encoding="utf-8"))["claims"]
+    answers = json.loads((folder / "claims.json").read_text(encoding="utf-8"))["claims"]
     for name, drawn in {"paper_flss": "figure-4-walk", "paper_phases": "figure-5"}.items():
         shutil.copyfile(folder / "figures" / f"{drawn}.png", IMAGES / f"{name}.png")
-    return [_agreeing(claims), _claims(claims), _own_sets()]
+    return [_agreeing(answers), _claims(answers), _own_sets()]
 
 
-def _agreeing(claims: list[dict[str, Any]]) -> str:
+def _agreeing(answers: list[dict[str, Any]]) -> str:
     counts = []
     for variant, time in (("", "walk"), ("", "start"), ("lasting", "walk"), ("lasting", "start")):
-        agree = [claim for claim in claims if _answer(claim, time, variant)["verdict"] == "agrees"]
-        held_out, of = (sum(not claim["calibrates"] for claim in some) for some in (agree, claims))
-        counts.append([variant or "printed", time, f"{held_out} of {of}", f"{len(agree)} of {len(claims)}"])
+        agree = [claim for claim in answers if _answer(claim, time, variant)["verdict"] == "agrees"]
+        held_out, of = (sum(claim["kind"] == "held out" for claim in some) for some in (agree, answers))
+        counts.append([variant or "printed", time, f"{held_out} of {of}", f"{len(agree)} of {len(answers)}"])
     return table("model variant|observation time|held-out claims that agree|all claims that agree", counts)
 
 
-def _claims(claims: list[dict[str, Any]]) -> str:
-    rows, before = [], ""
-    for (section, text, printed), group in groupby(claims, _without_network):
-        both, values, wheres, verdicts = [*group], [], [], []
-        for claim in both:
-            network = claim["paper"].rpartition(", ")[2]
-            ours = _answer(claim, "walk")
+def _claims(answers: list[dict[str, Any]]) -> str:
+    """Return the table of claims; neighbours that differ in the network alone, ', HWS' and ', LDVS', are one row."""
+    rows, before, known = [], "", claims()
+    for (section, text, printed), group in groupby(
+        answers, lambda one: (one["section"], NETWORK.sub("", known[one["key"]].text), one["value"])
+    ):
+        both, values, wheres, verdicts, why = [*group], [], [], [], ""
+        for one in both:
+            claim, ours = known[one["key"]], _answer(one, "walk")
             said = number(*(nan if ours[key] is None else ours[key] for key in ("value", "low", "high")))
-            values.append(f"{network} {said}" if len(both) > 1 else said)
-            wheres.append(ours["where"].removeprefix("V = "))
-            calibrated = "\\*" if claim["calibrates"] else ""
-            verdicts.append(("agrees" if ours["verdict"] == "agrees" else f"**{ours['verdict']}**") + calibrated)
-        differ = [claim for claim in both if _answer(claim, "walk")["verdict"] != "agrees"]
-        why = (differ[0]["why"] or "unknown") if differ else ""
-        text = text if len(both) > 1 else both[0]["paper"]
+            values.append(f"{claim.text.rpartition(', ')[2]} {said}" if len(both) > 1 else said)
+            wheres.append(re.sub(r"(.+), mean to ", r"mean, \1-", ours["where"].removeprefix("V = ")))
+            agrees = ours["verdict"] == "agrees"
+            verdicts.append(("agrees" if agrees else "**differs**") + "\\*" * bool(claim.calibrates))
+            why = why if agrees else claim.why or "unknown"
+        text = text if len(both) > 1 else known[both[0]["key"]].text
         again = "as above" if why == before else why
         rows.append([section, text, printed, *map(alike, (values, wheres, verdicts)), again if why else ""])
         before = why or before
     return table("section|claim|paper|hexmj|at V|verdict|reason", rows)
-
-
-def _without_network(claim: dict[str, Any]) -> tuple[str, str, str]:
-    """Return section, text and value of a claim; neighbours that differ in the network alone become one row."""
-    text, _, network = claim["paper"].rpartition(", ")
-    return claim["section"], text if network in ("HWS", "LDVS") else claim["paper"], claim["value"]
 
 
 def _answer(claim: dict[str, Any], time: str, variant: str = "") -> dict[str, Any]:
@@ -168,11 +165,10 @@ def main() -> None:
     folders = {paper: "reproduce", league: "league", biology: "biology", speed: "bench"}
     for write, name in folders.items():
         page = PAGES / f"{write.__name__}.md"
-        try:
-            tables = iter(write(results / name))
-        except FileNotFoundError as error:
-            print(f"{page.name} stays: {error.filename} does not exist")
+        if not (results / name).is_dir():
+            print(f"{page.name} stays: {results / name} does not exist")
             continue
+        tables = iter(write(results / name))
         before, *parts = page.read_text(encoding="utf-8").split(BEGIN)
         text = before + "".join(BEGIN + next(tables) + END + part.partition(END)[2] for part in parts)
         page.write_text(text, encoding="utf-8")
