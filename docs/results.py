@@ -20,8 +20,7 @@ import hexmj
 from hexmj import io
 from hexmj.paper.claims import claims
 from hexmj.plotting import as_shipped
-from hexmj.studies.biology import ANIMALS, biology_figure, table_rows, walked_in_words
-from hexmj.studies.league_figure import league_figure, walks_figure
+from hexmj.studies.biology import ANIMALS, table_rows, walked_in_words
 from hexmj.studies.standings import by_rank, frequency, place
 
 PAGES = Path(__file__).parent / "results"
@@ -114,8 +113,8 @@ def league(folder: Path) -> list[str]:
     """Return the table of the league, the fewest falls first, and draw its two figures."""
     result = io.load(folder / "league.nc")
     with as_shipped():
-        io.save_figure(league_figure(result), IMAGES / "league.png")
-        io.save_figure(walks_figure(result), IMAGES / "league_walks.png")
+        io.save_figure(hexmj.plot(result), IMAGES / "league.png")
+        io.save_figure(hexmj.plot(result, "walks"), IMAGES / "league_walks.png")
     rows = []
     for name in by_rank(result).entrant.values:
         own = result.sel(entrant=name)
@@ -136,7 +135,7 @@ def biology(folder: Path) -> list[str]:
     """Return the rows with a figure of insects, and draw the figure."""
     result = io.load(folder / "biology.nc")
     with as_shipped():
-        io.save_figure(biology_figure(result), IMAGES / "biology.png")
+        io.save_figure(hexmj.plot(result), IMAGES / "biology.png")
     known = [row for row in table_rows(result) if row[2] != "-"]
     rows = []
     for (name, source), group in groupby(known, lambda row: (VARIED.sub("", row[0]), row[4])):
@@ -162,13 +161,14 @@ def speed(folder: Path) -> list[str]:
 def main() -> None:
     """Write every page whose results are in the folder."""
     results = Path(sys.argv[1] if len(sys.argv) > 1 else "results")
-    folders = {paper: "reproduce", league: "league", biology: "biology", speed: "bench"}
-    for write, name in folders.items():
+    files = {paper: "reproduce/claims.json", league: "league/league.nc"}
+    files |= {biology: "biology/biology.nc", speed: "bench/table.md"}
+    for write, name in files.items():
         page = PAGES / f"{write.__name__}.md"
-        if not (results / name).is_dir():
+        if not (results / name).exists():
             print(f"{page.name} stays: {results / name} does not exist")
             continue
-        tables = iter(write(results / name))
+        tables = iter(write((results / name).parent))
         before, *parts = page.read_text(encoding="utf-8").split(BEGIN)
         text = before + "".join(BEGIN + next(tables) + END + part.partition(END)[2] for part in parts)
         page.write_text(text, encoding="utf-8")
