@@ -1,6 +1,7 @@
 """Films: frames, colours, clock, overlay and encoder."""
 
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -26,7 +27,7 @@ from hexmj.replay.film import Film
 from hexmj.replay.overlay import Overlay
 from hexmj.replay.recording import record, record_plan
 from hexmj.replay.take import Take, margin_in_words, walk_figure
-from hexmj.replay.video import _view, render, write_film
+from hexmj.replay.video import _view, render
 from hexmj.starts import draw_starts
 
 DURATION = 24.0  # time units, 0.3 s
@@ -251,11 +252,9 @@ def test_a_film_that_fails_leaves_the_old_one(fallen, tmp_path):
 @drawing
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # mediapy leaves a pipe open
 def test_a_missing_or_failing_ffmpeg_is_an_error(fallen, tmp_path, monkeypatch):
-    with pytest.raises(RenderingError, match="ffmpeg"):
-        write_film(tmp_path / "absent" / "film.mp4", 100 * [np.zeros((64, 64, 3), np.uint8)], 30.0)
-    with monkeypatch.context() as changed:
-        changed.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "no-ffmpeg"))
-        with pytest.raises(RenderingError, match="ffmpeg"):
+    for program in ("no-ffmpeg", "false"):  # a missing program, and one that stops with an error
+        with monkeypatch.context() as changed, pytest.raises(RenderingError, match="ffmpeg"):
+            changed.setenv("IMAGEIO_FFMPEG_EXE", shutil.which(program) or str(tmp_path / program))
             render([fallen], tmp_path / "film.mp4", SMALL)
     monkeypatch.setitem(sys.modules, "mediapy", None)
     monkeypatch.setattr("hexmj.replay.video.find_spec", lambda name: None)

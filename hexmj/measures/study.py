@@ -176,8 +176,6 @@ def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Pro
     from hexmj.measures.physical import physical_outcomes
 
     settled = settled_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
-    outcomes = physical_outcomes(
-        settled, walks.controller, walks.velocity, walks.duration,
-        acceleration=walks.acceleration, threads=threads, progress=progress,
-    )  # fmt: skip
+    how: Any = {"acceleration": walks.acceleration, "threads": threads, "progress": progress}
+    outcomes = physical_outcomes(settled, walks.controller, walks.velocity, walks.duration, **how)
     return over_start(vars(outcomes), UNITS)

@@ -191,7 +191,7 @@ class WalkSoFar(OutcomesSoFar):
             getattr(self.measured, name)[at] = getattr(seen, name)
         found = {name: getattr(chunk, name)[:, columns] for name in ("load", "qpos", "torque") if name in self.kept}
         if "ground_force" in self.kept:
-            found["ground_force"] = -sensors[..., compiled.columns.feet_push].reshape(feet.shape)
+            found["ground_force"] = 0.0 - sensors[..., compiled.columns.feet_push].reshape(feet.shape)
             found["ground_force"][..., 2] -= sensors[..., compiled.columns.touch] - found["load"]  # adhesion
         found |= {"height": -compiled.depth(feet), "centre_of_mass": centre.swapaxes(0, 1)}
         for name, values in found.items():

@@ -36,8 +36,7 @@ class Film:
 
     def __post_init__(self) -> None:
         for name, most in (("width", 1920), ("height", 1080)):
-            size = whole(name, getattr(self, name), 64, most)
-            if size % 2:
+            if (size := whole(name, getattr(self, name), 64, most)) % 2:
                 raise InputError(f"{name} = {size}; expected an even number of pixels")
         number("fps", self.fps, 1.0, 240.0)
         number("slow_motion", self.slow_motion, 0.001, 1000.0)

@@ -288,8 +288,7 @@ def _dataset(
     }
     coordinates = _filled(TIMES, values) | {"leg": list(LEGS), "coordinate": list("xyz")}
     attributes = {"title": title, **conditions.settings(), **_stride_settings(stride)}
-    recording = Recording(_filled(PLANNED | MEASURED, values), coordinates, attributes)
-    return _with_pose(recording, conditions)
+    return _with_pose(Recording(_filled(PLANNED | MEASURED, values), coordinates, attributes), conditions)
 
 
 def _filled(table: dict[str, tuple], values: dict[str, np.ndarray]) -> dict[str, tuple]:

@@ -21,9 +21,6 @@ COLUMNS = {
 }  # fmt: skip
 """Variable of a recording -> names of its columns, in which the labels of its axes replace the braces."""
 
-ROOT = ("x [mm]", "y [mm]", "z [mm]", "qw", "qx", "qy", "qz")
-"""Columns of the root in `qpos`."""
-
 
 class Recording(xr.Dataset):
     """The recording of one walk: an `xarray.Dataset` whose table has one row for each step of the plan."""
@@ -52,7 +49,8 @@ class Recording(xr.Dataset):
         data, columns = self, {}
         if "qpos" in self:
             root, meaning = self["qpos"].values[:, :ROOT_QPOS], {"long_name": "pose of the root in the world"}
-            data = self.assign_coords(pose=list(ROOT)).assign(root=(("step", "pose"), root, meaning))
+            data = self.assign_coords(pose=["x [mm]", "y [mm]", "z [mm]", "qw", "qx", "qy", "qz"])
+            data = data.assign(root=(("step", "pose"), root, meaning))
         for variable in (name for name in COLUMNS if name in data.variables):
             values = data[variable].transpose("step", ...)
             for index in np.ndindex(values.shape[1:]):

@@ -1,6 +1,6 @@
 """Films of recordings: the body, its support polygon, a caption and a footfall diagram."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from importlib.util import find_spec
@@ -72,34 +72,21 @@ def render(
     takes = takes_of(recordings, body, MOST_PANELS)
     if reason := missing():
         raise RenderingError(reason)
+    import imageio_ffmpeg
+    import mediapy
+
     begin, end = min(take.begin for take in takes), max(take.end for take in takes)
     frames = max(1, round((end - begin) * film.slow_motion * film.fps))
     times = begin + np.arange(frames) / (film.fps * film.slow_motion)
     overlays = [Overlay(take, film, begin, end) for take in takes]
     with shown(progress, "rendering") as advance, replacing(path) as part:
-        write_film(part, _frames(takes, overlays, times, film, advance), film.fps)
+        try:
+            mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
+            pictures = _frames(takes, overlays, times, film, advance)
+            mediapy.write_video(part.absolute(), pictures, fps=film.fps, **ENCODINGS[path.suffix])
+        except (OSError, RuntimeError) as error:
+            raise RenderingError(f"ffmpeg failed: {' '.join(str(error).split()):.300}") from None
     return frames
-
-
-def write_film(path: Path, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Encode frames as a film and write its file.
-
-    Args:
-        path: file of the film, with a suffix of `ENCODINGS`.
-        frames: arrays (height, width, 3) of uint8, with even height and width.
-        fps: frames per second.
-
-    Raises:
-        RenderingError: ffmpeg is missing or fails.
-    """
-    import imageio_ffmpeg
-    import mediapy
-
-    try:
-        mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-        mediapy.write_video(path.absolute(), frames, fps=fps, **ENCODINGS[path.suffix])
-    except (OSError, RuntimeError) as error:
-        raise RenderingError(f"ffmpeg failed: {' '.join(str(error).split()):.300}") from None
 
 
 def missing() -> str | None:
