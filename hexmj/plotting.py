@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from io import BytesIO
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,25 +39,26 @@ CURVE: dict[str, Any] = {"marker": "o", "markersize": 4, "linewidth": 1.6, "caps
 BESIDE = 0.024
 """Width in V_r / V_p over which points of the same velocity are spread, so that they do not overlap."""
 
-MOST_TICKS = 9
-"""Maximum number of velocities that each get a tick at an axis; if there are more, matplotlib chooses the ticks."""
-
 MEASURE_STYLES: dict[str, dict[str, Any]] = {
-    "kinematic": {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
-    "measured": {"color": "#e08e1b", "marker": "s", "linestyle": "--"},
-    "physical": {"color": "#b3261e", "marker": "^", "linestyle": "-."},
-    "toppled": {"color": "#6a4c93", "marker": "x", "linestyle": ":"},
+    "kinematic": {"color": "#1b6ca8", "marker": "o", "linestyle": "-", "label": "kinematic FLSS: planned feet"},
+    "measured": {"color": "#c8740a", "marker": "s", "linestyle": "--", "label": "measured FLSS: feet that carry load"},
+    "physical": {"color": "#b3261e", "marker": "^", "linestyle": "-.", "label": "frequency of falls: trunk on ground"},
+    "toppled": {"color": "#6a4c93", "marker": "x", "linestyle": ":", "label": "toppled: trunk tilts by over 0.1 rad"},
+    "grounded": {"color": "#2a9d5c", "marker": "D", "linestyle": "--", "label": "grounded FLSS: feet close to ground"},
 }
-"""Measure -> style of its curve; markers and lines differ too, for readers without colours."""
+"""Measure -> style and label of its curve; markers and lines differ too, for readers without colours."""
 
 SERIES: tuple[dict[str, Any], ...] = (
-    {"color": "#1b6ca8", "marker": "o", "linestyle": "-"},
-    {"color": "#2a9d5c", "marker": "s", "linestyle": "--"},
-    {"color": "#e08e1b", "marker": "^", "linestyle": "-."},
-    {"color": "#b3261e", "marker": "D", "linestyle": ":"},
-    {"color": "#6a4c93", "marker": "v", "linestyle": (0, (5, 1))},
+    {"color": "#17807e", "marker": "o", "linestyle": "-"},
+    {"color": "#c2487f", "marker": "s", "linestyle": "--"},
+    {"color": "#8a6d3b", "marker": "^", "linestyle": "-."},
+    {"color": "#556270", "marker": "D", "linestyle": ":"},
+    {"color": "#9aa51b", "marker": "v", "linestyle": (0, (5, 1))},
 )
 """Styles, in this order, of curves for something else than a measure of stability: a strategy, or a velocity."""
+
+SHARE = "share of the starts"
+"""Label of an axis of frequencies."""
 
 VELOCITY = "velocity $V_r / V_p$"
 """Label of a velocity axis."""
@@ -100,10 +102,13 @@ def as_shipped() -> Iterator[None]:
 
 
 def picture(width: float, height: float) -> "Figure":
-    """Return an empty figure of this size [inches] with matplotlib's constrained layout, which notebooks can show."""
+    """Return an empty figure with matplotlib's constrained layout, which notebooks can show.
+
+    It is `width` [inches] wide, but at most 10, so that texts of 9 points stay legible on a slide of this width.
+    """
     from matplotlib.figure import Figure
 
-    figure: Any = Figure(figsize=(width, height), layout="constrained")
+    figure: Any = Figure(figsize=(min(width, 10.0), height), layout="constrained")
 
     def png() -> bytes:
         drawn = BytesIO()
@@ -114,9 +119,28 @@ def picture(width: float, height: float) -> "Figure":
     return figure
 
 
-def head(figure: "Figure", *lines: str) -> None:
-    """Set the title of a figure. Empty lines are left out, and long lines are wrapped."""
-    figure.suptitle("\n".join(filter(None, lines)), fontsize=10, wrap=True)
+def head(figure: "Figure", finding: str, *conditions: str) -> None:
+    """Write a finding in bold above a figure and its conditions below the finding. Empty texts are left out."""
+    width, height = 72.0 * figure.get_size_inches()
+    top, words = height - 7.0, "; ".join(filter(None, conditions))
+    for text, size, broad, colour in (
+        (finding[:1].upper() + finding[1:], 11.0, 0.62, "0.0"),
+        (words, 9.0, 0.53, "0.3"),
+    ):
+        lines, weight = wrap(text, int(width / (broad * size))), "bold" if text != words else "normal"
+        style: Any = {"ha": "center", "va": "top", "fontsize": size, "fontweight": weight, "color": colour}
+        figure.text(0.5, top / height, "\n".join(lines), **style)
+        top -= 1.35 * size * len(lines) + 2.0
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, top / height))
+
+
+def where(v: np.ndarray, holds: np.ndarray) -> str:
+    """Return in words at which velocities, (velocity,) in increasing order, something holds, such as "at V = 0.5"."""
+    at = [f"{one:g}" for one in v[holds]]
+    text = f"at V = {', '.join(at)}" if at else "at no V"
+    if len(at) > 1 and holds[-len(at) :].all():
+        text = "at every V" if holds.all() else f"from V = {at[0]} on"
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def in_figure(text: str) -> str:
@@ -130,11 +154,11 @@ def tidy(axes: "Axes") -> None:
     axes.grid(color="0.9", linewidth=0.8)
 
 
-def flss_axes(axes: "Axes", velocities: np.ndarray) -> None:
-    """Set labels, limits and ticks of axes that show FLSS against velocities, (velocity,)."""
+def flss_axes(axes: "Axes", velocities: np.ndarray, label: str = SHARE) -> None:
+    """Set labels, limits and ticks of axes that show frequencies against velocities, (velocity,)."""
     low, high = max(-BESIDE, velocities.min() - 0.1), min(1.0 + BESIDE, velocities.max() + 0.1)
-    axes.set(xlabel=VELOCITY, xlim=(low, high), ylabel="FLSS", ylim=(-0.02, 1.02))
-    if len(velocities) <= MOST_TICKS:
+    axes.set(xlabel=VELOCITY, xlim=(low, high), ylabel=label, ylim=(-0.02, 1.02))
+    if len(velocities) <= 9:  # else matplotlib chooses the ticks
         axes.set_xticks(velocities, [f"{v:g}" for v in velocities])
     tidy(axes)
 
@@ -150,11 +174,12 @@ def interval(data: "xr.Dataset", name: str) -> tuple[np.ndarray, np.ndarray]:
     return middle, np.stack([middle - low, high - middle])
 
 
-def heat_map(axes: "Axes", values: np.ndarray, texts: np.ndarray, **style: Any) -> "AxesImage":
-    """Draw a heat map without a frame, with a text in every cell.
+def heat_map(axes: "Axes", velocities: np.ndarray, values: np.ndarray, texts: np.ndarray, **style: Any) -> "AxesImage":
+    """Draw a heat map without a frame, with a text in every cell and a column for each velocity.
 
     Args:
         axes: axes to draw in.
+        velocities: labels of the columns, (column,).
         values: numbers shown as colours, (row, column); NaN has no colour.
         texts: texts of the cells, (row, column); an empty text is not drawn.
         style: options of `Axes.imshow`.
@@ -163,13 +188,10 @@ def heat_map(axes: "Axes", values: np.ndarray, texts: np.ndarray, **style: Any) 
     shade = image.to_rgba(values)[..., :3] @ [0.3, 0.59, 0.11]
     for row, column in np.argwhere(texts != ""):
         colour = "white" if shade[row, column] < 0.5 and np.isfinite(values[row, column]) else "0.1"
-        axes.text(column, row, str(texts[row, column]), color=colour, ha="center", va="center", fontsize=8)
+        axes.text(column, row, str(texts[row, column]), color=colour, ha="center", va="center", fontsize=9)
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
-    return image
-
-
-def velocity_columns(axes: "Axes", velocities: np.ndarray) -> None:
-    """Label the columns of a heat map with velocities, (column,)."""
-    axes.set_xticks(range(len(velocities)), [f"{v:g}" for v in velocities], fontsize=8)
+    every = 1 + len(velocities) // 7
+    axes.set_xticks(range(0, len(velocities), every), [f"{v:g}" for v in velocities[::every]], fontsize=9)
     axes.set_xlabel(VELOCITY, fontsize=9)
+    return image

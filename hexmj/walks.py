@@ -131,7 +131,7 @@ def spans(time: np.ndarray, on: np.ndarray) -> list[tuple[float, float]]:
     return [(float(time[a] - step), float((b - a) * step)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def footfall_html(line: str, time: np.ndarray, swings: np.ndarray, note: str) -> str:
+def footfall_html(line: str, time: np.ndarray, swings: np.ndarray, note: str, width: int = 640) -> str:
     """Return HTML for notebooks: a line of text, and a footfall diagram with a bar for each swing.
 
     Args:
@@ -139,8 +139,9 @@ def footfall_html(line: str, time: np.ndarray, swings: np.ndarray, note: str) ->
         time: time at the end of each step, (step,), at least two steps [time units].
         swings: True for feet that are off the ground, (step, leg).
         note: text below the bars, after the time.
+        width: width of the bars [pixels].
     """
-    width, row, left = 640, 14, 28  # width of the bars, height of a leg's row, width of leg names [pixels]
+    row, left = 14, 28  # height of a leg's row, width of leg names [pixels]
     step = time[1] - time[0]
     begin, scale = time[0] - step, width / (time[-1] - time[0] + step)
     bars = [
@@ -151,7 +152,7 @@ def footfall_html(line: str, time: np.ndarray, swings: np.ndarray, note: str) ->
     ]
     names = [f'<text x="0" y="{row * (leg + 1) - 3}">{name}</text>' for leg, name in enumerate(LEGS)]
     low = row * (len(LEGS) + 1)
-    caption = f"{begin:.4g} to {time[-1]:.4g} time units; bars: foot off the ground; {escape(note)}"
+    caption = f"{begin:.4g} to {time[-1]:.4g} time units; bars: foot off the ground{'; ' * bool(note)}{escape(note)}"
     names.append(f'<text x="{left}" y="{low}">{caption}</text>')
     style = 'style="max-width: 100%" fill="currentColor" font-family="sans-serif" font-size="11"'
     box = f'viewBox="0 0 {left + width} {low + 4}" width="{left + width}"'

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.text import Text
 from PIL import Image
 
 import hexmj
@@ -107,6 +108,12 @@ def test_curves_join_neighbours_in_any_order(name: str, axis: str) -> None:
     assert len(curves) > 0 and all(np.all(np.diff(x) >= 0.0) for x in map(np.asarray, curves))
 
 
+def head_of(result: xr.Dataset) -> str:
+    """The finding and the conditions above the first figure of a result."""
+    texts = [text.get_text() for text in hexmj.plot(result).texts]
+    return " ".join(" ".join(texts).replace("\N{NO-BREAK SPACE}", " ").split())
+
+
 def cells(result: xr.Dataset) -> list[tuple[str, ...]]:
     """Title, row and column of each cell of a map's panels, its text and the number behind its colour."""
     found, figure = [], hexmj.plot(result)
@@ -158,15 +165,32 @@ def test_settings_are_those_that_were_given() -> None:
 
 
 def test_the_title_names_what_differs_from_the_defaults() -> None:
-    title = hexmj.plot(made("compare")).get_suptitle().replace("\N{NO-BREAK SPACE}", " ")
+    title = head_of(made("compare"))
     for words in ("3 starts", "seed 0", "20 time units", "200 mm/s", "friction = 0.5", "ground = step", "a = 0.02"):
         assert words in title
     assert "step height" not in title
     lasting = hexmj.flss(hexmj.load_controller("lasting"), 0.5, n_starts=5, stride=hexmj.Stride(aep0=9.5))
-    title = hexmj.plot(lasting).get_suptitle()
+    title = head_of(lasting)
     assert title.count("lasting") == 2 and "9.5" in title
-    shown = hexmj.plot(made("compare").sel(controller=["null"])).get_suptitle()
+    shown = head_of(made("compare").sel(controller=["null"]))
     assert "null" in shown and NAME[:2] not in shown
+
+
+@pytest.mark.parametrize("name", few_of(MADE, *QUICK, "map", "terrain"))
+def test_texts_are_legible_on_a_slide_of_10_inches(name: str) -> None:
+    for which in FIGURES[name]:
+        figure = hexmj.plot(made(name), which)
+        texts = [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
+        assert min(text.get_fontsize() for text in texts) * 10.0 / figure.get_figwidth() >= 9.0
+
+
+@pytest.mark.parametrize(("planned", "fell", "words"), [(1, 0, "at V = 0.5"), (0, 1, "at no V"), (1, 1, "at no V")])
+def test_the_finding_of_a_comparison_follows_its_walks(planned: int, fell: int, words: str) -> None:
+    result = xr.concat([made("compare")] * 20, "start", data_vars="minimal").sortby("velocity")
+    lost = result.fall.copy(data=np.full(result.fall.shape, np.inf))
+    lost[:, 1:] = 3.0
+    result = result.assign(planned_loss=lost if planned else lost * np.inf, fall=lost if fell else lost * np.inf)
+    assert head_of(result).count(words) == 2
 
 
 def test_a_notebook_shows_a_figure() -> None:

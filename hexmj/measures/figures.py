@@ -9,7 +9,9 @@ import numpy as np
 
 from hexmj.conditions import unusual
 from hexmj.io import settings
-from hexmj.plotting import BESIDE, LEGEND, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture
+from hexmj.measures.tables import happened
+from hexmj.plotting import BESIDE, LEGEND, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture, where
+from hexmj.stats import paired_difference
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
@@ -27,11 +29,12 @@ UNITS: dict[str, str] = {
 SYMBOLS = {"vp": "$V_p$", "aep0": "AEP$_0$", "pep0": "PEP$_0$", "pep_min": "PEP_min"}
 """Field of `Conditions` or `Stride` -> its symbol in a caption, if that is not the field's name."""
 
-FEW = 3
-"""Maximum number of controllers whose names a caption lists; of more, it lists those that deviate from the paper."""
+TIMES = {"walk": "three leg periods", "start": "two protractions"}
+"""Named observation time -> its text in a caption."""
 
-COLUMNS = 3
-"""Maximum number of panels in a row."""
+FEW = 3
+"""Maximum number of panels in a row, and of controllers whose names a caption lists; of more, it lists those that
+deviate from the paper."""
 
 
 def caption(result: "xr.Dataset", least: int | None = None) -> str:
@@ -45,7 +48,8 @@ def caption(result: "xr.Dataset", least: int | None = None) -> str:
     if "starts" in recorded:
         words.append(starts_in_words(recorded["starts"]))
     if (time := recorded.get("observation_time")) is not None:
-        words.append(f"observation time {f'of {time:g} time units' if isinstance(time, float) else time}")
+        length = f"{time:g} time units" if isinstance(time, float) else TIMES.get(time, time)
+        words.append(f"observation time: {length}")
     if "seed" in recorded:
         words.append(f"seed {recorded['seed']}")
     if acceleration := recorded.get("acceleration"):
@@ -87,34 +91,49 @@ def network_rules(controller: Any) -> str:
 
 
 def comparison_figure(result: "xr.Dataset") -> "Figure":
-    """Draw a result of `compare`: FLSS against velocity with 95 % intervals, a panel for each controller."""
-    names = result.controller.values
-    columns = min(COLUMNS, len(names))
+    """Draw a result of `compare`: frequencies against velocity with 95 % intervals, a panel for each controller."""
+    result = result.sortby("velocity").transpose("controller", "velocity", "start", ...)
+    names, shown = result.controller.values, {name: style for name, style in MEASURE_STYLES.items() if name in result}
+    columns = min(FEW, len(names))
     rows = -(-len(names) // columns)
-    figure = picture(max(5.6, 3.4 * columns), 1.3 + 2.7 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False)
-    shifts = np.linspace(-0.5, 0.5, len(MEASURE_STYLES)) * BESIDE
+    figure = picture(max(7.0, 3.4 * columns), 1.6 + 2.9 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    shifts = np.linspace(-0.5, 0.5, len(shown)) * BESIDE
     for axes, name in zip(panels.ravel(), names, strict=False):
-        data = result.sel(controller=name).sortby("velocity")
-        for (measure, style), shift in zip(MEASURE_STYLES.items(), shifts, strict=True):
-            frequency_curve(axes, data.velocity + shift, data, measure, label=measure, **{"markersize": 4.5} | style)
-        axes.set_title(in_figure(name), fontsize=10)
+        data = result.sel(controller=name)
+        for (measure, style), shift in zip(shown.items(), shifts, strict=True):
+            frequency_curve(axes, data.velocity + shift, data, measure, **style)
+        axes.set_title(in_figure(name), fontsize=11)
         flss_axes(axes, result.velocity.values)
+        axes.label_outer(remove_inner_ticks=False)
     for axes in panels.ravel()[len(names) :]:
         axes.set_visible(False)
     handles, _ = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=len(handles))
-    head(figure, "Loss of static stability: kinematic, and measured under the feet; physical: falls", caption(result))
+    figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=2)
+    head(figure, _exceeding(result), caption(result), "bars: 95 % intervals")
     return figure
+
+
+def _exceeding(result: "xr.Dataset") -> str:
+    """Return the velocities at which more starts lose planned stability than fall, beyond the 95 % interval."""
+    lost, fell = (happened(result[outcome]).values for outcome in ("planned_loss", "fall"))
+    more, says = paired_difference(lost, fell)[1] > 0.0, "the kinematic FLSS exceeds the frequency of falls"
+    if len(more) > FEW:
+        return f"{says} in {more.sum()} of {more.size} cases (controller and velocity)"
+    named = zip(result.controller.values, more, strict=True)
+    return f"{says}: " + "; ".join(f"{in_figure(name)} {where(result.velocity.values, row)}" for name, row in named)
 
 
 def flss_figure(result: "xr.Dataset") -> "Figure":
     """Draw a result of `flss` or `physical_flss`: FLSS against velocity with 95 % intervals."""
-    figure, kind = picture(6.4, 4.2), "physical" if "fall" in result else "kinematic"
-    axes, data = figure.subplots(), result.rename(low="flss_low", high="flss_high").sortby("velocity")
-    frequency_curve(axes, data.velocity, data, "flss", **{"markersize": 4.5} | MEASURE_STYLES[kind])
-    flss_axes(axes, result.velocity.values)
-    head(figure, f"{kind} FLSS with 95 % intervals", caption(result))
+    kind, label = ("physical", "frequency of falls") if "fall" in result else ("kinematic", "kinematic FLSS")
+    figure, data = picture(7.0, 4.4), result.rename(low="flss_low", high="flss_high").sortby("velocity")
+    axes = figure.subplots()
+    frequency_curve(axes, data.velocity, data, "flss", **MEASURE_STYLES[kind])
+    flss_axes(axes, result.velocity.values, label)
+    ends = data.isel(velocity=[0, -1][: data.sizes["velocity"]])
+    values = " and ".join(f"{f:.2f} at V = {v:g}" for f, v in zip(ends.flss.values, ends.velocity.values, strict=True))
+    head(figure, f"the {label} is {values}", caption(result), "bars: 95 % intervals")
     return figure
 
 

@@ -14,7 +14,7 @@ from hexmj.measures.tables import VELOCITY
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import kept, main_peak
 from hexmj.phases import PAIRS, circular_mean, wilson_phase
-from hexmj.plotting import picture
+from hexmj.plotting import SERIES, head, picture, where
 from hexmj.timing import OBSERVATION_TIMES
 from hexmj.walks import spans
 
@@ -34,7 +34,8 @@ BINS = 51
 RELATIVE = {2: "o", 3: "s"}
 """Legs whose phases relative to leg 1 are drawn -> their symbols."""
 
-UNCOORDINATED, HWS, LDVS, IDEAL, ACCELERATED = "#7a7a7a", "#1b6ca8", "#b3261e", "#111111", "#e08e1b"
+UNCOORDINATED, IDEAL = "#7a7a7a", "#111111"
+HWS, LDVS, ACCELERATED = (style["color"] for style in SERIES[:3])
 MODELS = {"hws": HWS, "ldvs": LDVS}
 
 CIRCLES: dict[str, Any] = {"color": UNCOORDINATED, "marker": "o", "markerfacecolor": "white", "markersize": 6}
@@ -94,6 +95,9 @@ def phase_figure(measured: Measurements, model: str) -> "tuple[Figure, xr.Datase
         for leg, label in zip(RELATIVE, ("Gait II (Wilson)", None), strict=True):
             axes.plot(v, data.wilson.sel(leg=leg), "x", color=IDEAL, markersize=8, zorder=3, label=label)
     axes.set(xlabel="velocity $V$", ylabel="relative phase", xlim=(0, 1), ylim=(0, 1))
+    number, ends = {"hws": 5, "ldvs": 6}[model], " and ".join(f"{peak[0, n]:.2f} at V = {v[n]:g}" for n in (0, -1))
+    starts = f"Fig. {number} of the paper: phases of stable steady-state gaits; {gaits.sizes['start']} starts at each V"
+    head(figure, f"{model.upper()}: the main phase of leg 2 is {ends}", starts, "lines: main peak")
     axes.legend(frameon=False, fontsize=10)
     return figure, data
 
@@ -117,6 +121,7 @@ def phase_histograms(measured: Measurements, model: str) -> "tuple[Figure, xr.Da
         axes.set_title(f"$V$ = {at:g}\n{one.sizes['start']} stable gaits", fontsize=10)
     for axes, pair in zip(panels[:, 0], PAIRS, strict=True):
         axes.set_ylabel(f"$\\Phi$ {pair}", rotation=0, ha="right", va="center", fontsize=12)
+    head(figure, f"{model.upper()}: relative phases of its stable steady-state gaits", "pairs of legs in rows")
     figure.supxlabel("relative phase", fontsize=11)
     figure.supylabel("number of starts", fontsize=11)
     middle = (edges[:-1] + edges[1:]) / 2, {"units": "1", "long_name": "relative phase"}
@@ -136,9 +141,14 @@ def footfall_diagrams(measured: Measurements, model: str) -> "tuple[Figure, xr.D
             colour = MODELS[model] if row < 3 else "0.2"
             axes.broken_barh(spans(time, ~stance[:, row]), (row - 0.36, 0.72), color=colour)
         axes.set(ylim=(5.6, -0.6), xlim=(time[0], time[-1]), yticks=range(len(LEGS)), yticklabels=LEGS)
-        axes.tick_params(axis="y", length=0, labelsize=8)
+        axes.tick_params(axis="y", length=0, labelsize=9)
         axes.axhline(2.5, color="0.8", linewidth=0.8)
         axes.text(1.01, 0.5, f"$V$ = {v:g}", transform=axes.transAxes, va="center", fontsize=11)
+    head(
+        figure,
+        f"{model.upper()}: footfalls at {len(panels)} velocities",
+        "upper three rows: left legs" * (LEGS[0][0] == "L"),
+    )
     panels[-1].set_xlabel("time [periods of a single leg, $20\\,(1 + 1/V)$];  bars: protraction")
     return figure, data
 
@@ -162,7 +172,13 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
         look: dict[str, Any] = {"linewidth": 1.3, "capsize": 3} | style
         label += "" if one.sizes["velocity"] else ": not yet searched"
         axes.errorbar(one.velocity, one.flss, one.sample_sd, label=label, **look)
-    axes.set(xlabel="velocity $V$", ylabel="FLSS", xlim=(0, 1), ylim=(-0.02, 1.04))
+    axes.set(xlabel="velocity $V$", ylabel="kinematic FLSS", xlim=(0, 1), ylim=(-0.02, 1.04))
+    model = list(curves)[1]
+    lower = where(data.velocity.values, (data.flss.sel(curve=model) < data.flss[0]).values)
+    shown = f"Fig. {number} of the paper; observation time '{observation_time}'; means of {data.attrs['samples']}"
+    head(
+        figure, f"{curves[model][0]}: lower FLSS than without coordination {lower}", shown, "bars: standard deviations"
+    )
     axes.legend(frameon=False, fontsize=10)
     return figure, data
 

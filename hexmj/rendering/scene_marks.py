@@ -1,4 +1,4 @@
-"""Marks within a scene of MuJoCo: the support polygon, the projected centre of mass and the planned tips."""
+"""Marks within a scene of MuJoCo: the support polygon, the projected centre of mass, feet and planned tips."""
 
 from itertools import pairwise
 
@@ -16,6 +16,7 @@ STRONGER = 1.8
 
 CENTRE = (0.98, 0.72, 0.10)
 TIP = (0.13, 0.36, 0.72)
+STANDS, SWINGS = (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)
 
 EMISSION = 0.3
 """Fraction of a mark's colour that does not depend on the light."""
@@ -42,9 +43,16 @@ def mark_centre_of_mass(scene: mujoco.MjvScene, marks: Marks, centre: np.ndarray
 
 
 def mark_planned_tips(scene: mujoco.MjvScene, marks: Marks, tips: np.ndarray) -> None:
-    """Mark the commanded tips, (leg, 3) [mm]."""
+    """Mark the commanded tips, (leg, 3) [mm], by discs around the feet."""
     for tip in tips:
-        _add(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, marks.tip), tip, np.eye(3), (*TIP, 0.45))
+        _disc(scene, tip, 2.2 * marks.tip, 0.15 * marks.tip, (*TIP, 0.8))
+
+
+def mark_feet(scene: mujoco.MjvScene, marks: Marks, feet: np.ndarray, stance: np.ndarray) -> None:
+    """Mark feet at `feet`, (leg, 3) [mm]: those that stand, (leg,), black, the others white."""
+    for foot, stands in zip(feet, stance, strict=True):
+        colour = (*(STANDS if stands else SWINGS), 1.0)
+        _add(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, marks.tip), foot, np.eye(3), colour)
 
 
 def _rod(scene: mujoco.MjvScene, a: np.ndarray, b: np.ndarray, radius: float, rgba: tuple) -> None:

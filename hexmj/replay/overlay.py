@@ -1,4 +1,4 @@
-"""Overlay on the frames of a film: a caption at the top, a scale bar, and a growing footfall diagram at the bottom."""
+"""Overlay on the frames of a film: caption, scale bar, legend of all marks, and a growing footfall diagram."""
 
 from functools import cache
 from pathlib import Path
@@ -6,9 +6,11 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.ticker import MaxNLocator
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from hexmj.legs import LEGS
+from hexmj.plotting import MEASURE_STYLES
+from hexmj.rendering.scene_marks import CENTRE, STABLE, STANDS, SWINGS, TIP
 from hexmj.replay.film import Film
 from hexmj.replay.take import Take, margin_in_words
 
@@ -18,23 +20,27 @@ GREEN, RED = (0, 112, 72), (190, 56, 0)
 
 MINUS, TIMES = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 
-CAPTION, DIAGRAM = 48, 80
+CAPTION, STRIP, DIAGRAM = 48, 18, 80
 """Heights on a frame of 640 x 480 pixels, as all sizes in this file. The body's cameras keep these areas free."""
 
-BAR = 110
+BAR = 75
 """Maximum length of the scale bar, on a frame of 640 x 480 pixels [pixels]."""
 
 
 class Overlay:
-    """Draws caption, scale bar and footfall diagram of one take on frames of one size."""
+    """Draws caption, scale bar, legend and footfall diagram of one take on frames of one size."""
 
     def __init__(self, take: Take, film: Film, begin: float, end: float) -> None:
-        """Draw the complete diagram in advance, with a time axis from `begin` to `end` [s]."""
+        """Draw the legend and the complete diagram in advance, with a time axis from `begin` to `end` [s]."""
         self._take, self._begin, self._end, width, height = take, begin, end, film.width, film.height
         self._speed = "in real time" if film.slow_motion == 1 else f"at {1 / film.slow_motion:.2g} {TIMES} speed"
         self._scale = min(width / 640, height / 480)
         self._top, self._bottom = self._pixels(CAPTION), height - self._pixels(DIAGRAM)
         self._left, self._right = self._pixels(30), width - self._pixels(12)
+        lost = f"loss at {1000 * take.lost:.0f} ms" if np.isfinite(take.lost) else "no loss"
+        self._loss = f"{'measured' if take.physical else 'planned'} {lost}"
+        self._swing = ImageColor.getrgb(MEASURE_STYLES["measured" if take.physical else "kinematic"]["color"])
+        self._legend = self._marks()
         self._blank = self._axes(width, height - self._bottom)
         self._full = self._bars(self._blank.copy())
 
@@ -53,12 +59,13 @@ class Overlay:
         diagram[:, :now] = self._full[:, :now]
         diagram[: self._row(6), now : now + cursor] = INK
         frame[: self._top] = self._caption(frame[: self._top], row, seconds)
-        strip = frame[self._bottom - self._pixels(18) : self._bottom]
+        strip = frame[self._bottom - self._pixels(STRIP) : self._bottom]
         strip[:] = self._strip(strip, scale)
 
     def _strip(self, background: np.ndarray, scale: float) -> np.ndarray:
-        """Return `background` with a scale bar of a round length at the centre of mass, and the diagram's legend."""
-        image, font, edge = Image.fromarray(background), _font(self._pixels(11)), self._pixels(10)
+        """Return `background` with the legend, and a scale bar of a round length at the centre of mass."""
+        image, font, edge = _faded(background, 0.6), _font(self._pixels(11)), self._pixels(10)
+        image.paste(self._legend, (image.width - edge - self._legend.width, 0), self._legend)
         draw, middle = ImageDraw.Draw(image), image.height // 2
         if scale > 0:
             longest = self._pixels(BAR) / scale
@@ -69,42 +76,67 @@ class Overlay:
             for x in (edge, end):
                 draw.line((x, middle - self._pixels(3), x, middle + self._pixels(3)), INK, self._pixels(1))
             draw.text((end + self._pixels(5), middle), f"{length:g} mm", INK, font, "lm")
-        legend = "bars: foot off ground" if self._take.physical else "bars: protraction"
-        draw.text((image.width - edge, middle), legend, INK, font, "rm")
         return np.asarray(image)
+
+    def _marks(self) -> Image.Image:
+        """Return the legend of the marks in the scene and of the diagram's bars, drawn large and then reduced."""
+        size, font = 4 * self._pixels(STRIP), _font(4 * self._pixels(11))
+        image = Image.new("RGBA", (40 * size, size))
+        draw, right, middle, radius = ImageDraw.Draw(image), 0.0, size / 2, size / 4
+        named = {
+            "foot stands": STANDS,
+            "foot swings": SWINGS,
+            "planned tip": TIP,
+            "support polygon": STABLE,
+            "centre of mass": CENTRE,
+        }
+        for name, shades in named.items():
+            colour = tuple(round(255 * shade) for shade in shades)
+            if name == "foot swings":  # its bar, too
+                draw.rectangle((right, middle - radius / 2, right + 3 * radius, middle + radius / 2), self._swing)
+                right += 3.6 * radius
+            high = radius / (2 if name == "planned tip" else 1)
+            place = (right, middle - high, right + 2 * radius, middle + high)
+            (draw.rectangle if name == "support polygon" else draw.ellipse)(place, colour, INK, max(1, size // 24))
+            right += 2.8 * radius
+            draw.text((right, middle), name, INK, font, "lm")
+            right += draw.textlength(name, font) + 2.4 * radius
+        width = round(right - 2.4 * radius)
+        return image.crop((0, 0, width, size)).resize((width // 4, size // 4), Image.Resampling.LANCZOS)
 
     def _caption(self, background: np.ndarray, row: int, seconds: float) -> np.ndarray:
         """Return `background` with title and state in the first line, and time, velocities and margin in the second."""
         take, edge = self._take, self._pixels(10)
         bold, plain = _font(self._pixels(15), bold=True), _font(self._pixels(12))
-        image = Image.blend(Image.fromarray(background), Image.new("RGB", background.shape[1::-1], PAPER), 0.8)
+        image = _faded(background, 0.8)
         draw, first, second = ImageDraw.Draw(image), round(0.29 * self._top), round(0.75 * self._top)
         state, colour = self._state(row, seconds)
         title = _shortened(take.title, bold, image.width - 3 * edge - bold.getlength(state))
         draw.text((edge, first), title, INK, bold, "lm")
         draw.text((image.width - edge, first), state, colour, bold, "rm")
         outside = self._outside(seconds)
-        known = seconds < take.fell and not outside
         fields = {
             0.0: f"{1000 * seconds:.0f} ms = {seconds * take.conditions.vp:.1f} time units, {self._speed}",
-            0.51: "V = ?" if outside else f"V = {take.velocity[row]:.2f}",
-            0.615: f"Vₚ = {take.conditions.vp:g} mm/s",
-            0.79: margin_in_words(take.margin[row]).replace("-", MINUS) if known else "margin unknown",
+            0.46: "V = ?" if outside else f"V = {take.velocity[row]:.2f}",
+            0.565: f"Vₚ = {take.conditions.vp:g} mm/s",
         }
+        margin = margin_in_words(take.margin[row]).replace("-", MINUS)
+        last = "margin unknown" if outside else self._loss if seconds >= take.fell else margin
+        draw.text((image.width - edge, second), last, INK, plain, "rm")
         for place, text in fields.items():
             draw.text((edge + place * (image.width - 2 * edge), second), text, INK, plain, "lm")
         return np.asarray(image)
 
     def _state(self, row: int, seconds: float) -> tuple[str, tuple[int, int, int]]:
         """Return a text on the state of the body (stable, unstable, fallen), and the colour of the text."""
-        take, lost = self._take, f"{1000 * self._take.lost:.0f} ms"
+        take, after = self._take, f" ({self._loss})" if seconds >= self._take.lost else ""
         if seconds >= take.fell:
-            return f"■ fell on {take.part} at {1000 * take.fell:.0f} ms", RED
+            return f"■ {take.part} touches the ground at {1000 * take.fell:.0f} ms", RED
         if outside := self._outside(seconds):
             return outside, FAINT
         if take.margin[row] <= 0:
-            return f"▲ unstable, first at {lost}" if seconds >= take.lost else "▲ unstable", RED
-        return f"● stable, but lost at {lost}" if seconds >= take.lost else "● stable", GREEN
+            return "▲ unstable" + after, RED
+        return "● stable" + after, GREEN
 
     def _outside(self, seconds: float) -> str:
         """Return when the recording begins and ends if the time is outside it, as beside a longer one; else ""."""
@@ -144,7 +176,7 @@ class Overlay:
         axes[: self._row(6), columns[beyond]] = SHADE
         for leg in range(6):
             swing = columns[~take.stance[steps, leg] & ~beyond]
-            axes[self._row(leg) + gap : self._row(leg + 1) - gap + 1, swing] = INK
+            axes[self._row(leg) + gap : self._row(leg + 1) - gap + 1, swing] = self._swing
         if self._begin <= take.lost <= self._end:
             x = self._column(take.lost)
             axes[: self._row(6), x : x + self._pixels(1.5)] = RED
@@ -162,6 +194,11 @@ class Overlay:
     def _pixels(self, size: float) -> int:
         """Convert a length on a frame of 640 x 480 pixels to pixels of this film's frames."""
         return max(1, round(size * self._scale))
+
+
+def _faded(background: np.ndarray, share: float) -> Image.Image:
+    """Return an image of `background` mixed with this share of the colour of paper."""
+    return Image.blend(Image.fromarray(background), Image.new("RGB", background.shape[1::-1], PAPER), share)
 
 
 def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:

@@ -12,7 +12,7 @@ from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
-from hexmj.plotting import MEASURE_STYLES, in_figure, picture
+from hexmj.plotting import LEGEND, MEASURE_STYLES, head, in_figure, picture
 from hexmj.replay.recording import check_recording, recorded_conditions
 from hexmj.rotations import heading, turned
 from hexmj.stability import support_polygon
@@ -147,31 +147,35 @@ def walk_figure(recording: xr.Dataset) -> "Figure":
     Args:
         recording: a recording, or consecutive steps of it.
     """
-    figure = picture(8.0, 4.8)
+    figure = picture(8.0, 5.0)
     footfall, margin = figure.subplots(2, 1, sharex=True, height_ratios=(1.2, 1.0))
     time, planned = recording.time.values, recording.planned_stance.values
     physical = "measured_stance" in recording
     stance = recording.measured_stance.values if physical else planned
     shown = np.isfinite(recording.qpos.values).all(axis=1)  # False after a fall
-    blue, red = (MEASURE_STYLES[measure]["color"] for measure in ("kinematic", "physical"))
+    blue, orange, red = (MEASURE_STYLES[measure]["color"] for measure in ("kinematic", "measured", "physical"))
     for row, leg in enumerate(LEGS):
         off = spans(time, ~stance[:, row] & shown)
-        footfall.broken_barh(off, (row - 0.38, 0.56 if physical else 0.76), color="0.15")
+        footfall.broken_barh(off, (row - 0.38, 0.5 if physical else 0.76), color=orange if physical else blue)
         if physical:
-            footfall.broken_barh(spans(time, ~planned[:, row]), (row + 0.2, 0.18), color=blue)
+            footfall.broken_barh(spans(time, ~planned[:, row]), (row + 0.16, 0.22), color=blue)
         footfall.text(-0.01, row, leg, transform=footfall.get_yaxis_transform(), ha="right", va="center", fontsize=9)
-    footfall.set(ylim=(5.6, -0.6), yticks=[], title=in_figure(recording.attrs["title"]))
-    legend = "thick, black: foot off ground; thin, blue: planned protraction" if physical else "bars: protraction"
-    footfall.set_xlabel(legend, fontsize=8)
+    footfall.set(ylim=(5.6, -0.6), yticks=[])
+    footfall.set_ylabel("bars: foot off\nthe ground", labelpad=24)
     margin.axhline(0.0, color="0.6", linewidth=0.8)
     margin.plot(time, recording.planned_margin, color=blue, linewidth=1.2, label="planned")
+    events = {"planned loss of static stability": float(recording.planned_loss_time)}
     if physical:
         measured = np.where(np.isfinite(recording.measured_margin), recording.measured_margin, np.nan)
-        margin.plot(time, measured, color="0.15", linewidth=1.0, label="measured")
-        if (fall := float(recording.fall_time)) <= time[-1]:
-            margin.axvline(fall, color=red, linewidth=1.4, label="trunk on the ground")
+        margin.plot(time, measured, color=orange, linewidth=1.2, label="measured: feet that carry load")
+        events["trunk on the ground"] = fall = float(recording.fall_time)
+        if fall <= time[-1]:
+            margin.axvline(fall, color=red, linewidth=1.6, linestyle="-.", label="fall: trunk on the ground")
     margin.set(xlabel="time [time units]", ylabel="stability margin [mm]", xlim=(0.0, time[-1]))
-    figure.legend(frameon=False, fontsize=8, loc="outside lower center", ncols=3)
+    figure.legend(**LEGEND, loc="outside lower center", ncols=3)
     for axes in (footfall, margin):
         axes.spines[["top", "right"]].set_visible(False)
+    happened = [f"{event} at t = {at:.1f}" for event, at in events.items() if at <= time[-1]]
+    conditions = f"$V_p$ = {recording.attrs['vp']:g} mm/s; one time unit is 1 mm / $V_p$"
+    head(figure, "; ".join(happened) or "neither a loss nor a fall", in_figure(recording.attrs["title"]), conditions)
     return figure

@@ -18,7 +18,7 @@ from hexmj.errors import InputError, RenderingError, without_extra
 from hexmj.files import replacing
 from hexmj.progress import Progress, shown
 from hexmj.rendering import gl
-from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
+from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_feet, mark_planned_tips, mark_support
 from hexmj.replay.film import MOST_PANELS, Film
 from hexmj.replay.overlay import Overlay
 from hexmj.replay.take import Take, takes_of
@@ -158,6 +158,8 @@ def _view(stage: tuple[gl.Renderer, mujoco.MjData], camera: str, take: Take, row
     mark_support(renderer.scene, marks, corners, level, stable)
     mark_centre_of_mass(renderer.scene, marks, centre, level, stable)
     mark_planned_tips(renderer.scene, marks, take.planned_tip[row])
+    feet = [renderer.model.site(name).id for name in take.conditions.body.feet]
+    mark_feet(renderer.scene, marks, data.site_xpos[feet], take.stance[row])
     lens = renderer.scene.camera[0]
     ahead = float(np.dot(centre - lens.pos, lens.forward))
     if ahead <= lens.frustum_near:

@@ -15,7 +15,7 @@ from hexmj.errors import InputError
 from hexmj.files import read_toml, write_text
 from hexmj.io import results_folder, save, save_figure
 from hexmj.plain import plain
-from hexmj.plotting import as_shipped, head, in_figure, picture, tidy
+from hexmj.plotting import LEGEND, as_shipped, head, in_figure, picture, tidy
 from hexmj.progress import shown
 from hexmj.search.forms import FieldsForm, NetworkForm
 from hexmj.search.problems import Problem, Sample
@@ -29,8 +29,6 @@ FOUND = "found.toml"  # name of the found controller's file
 
 EVALUATIONS = "evaluations"
 """Name of the directory of cached evaluations, which is inside the results directory."""
-
-COLOURS = dict(zip(STAGES, ("#1b6ca8", "#b3261e"), strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,19 +169,25 @@ def _controller_toml(problem: Problem, vector: np.ndarray) -> str:
 
 def convergence_figure(history: "xr.Dataset") -> "Figure":
     """Draw the costs of all candidates and the lowest cost so far over the evaluations, from `stages.history`."""
-    figure = picture(6.8, 4.2)
+    figure, found = picture(8.0, 4.6), []
     axes = figure.subplots()
-    for number, (stage, colour) in enumerate(COLOURS.items()):
+    for number, stage in enumerate(STAGES):
         part = history.isel(evaluation=history.stage.values == number).sortby("evaluation")
         if part.sizes["evaluation"]:
-            evaluation = part.evaluation + 1
-            axes.plot(evaluation, part.cost, ".", color=colour, markersize=2.5, alpha=0.35)
-            axes.plot(evaluation, part.best, color=colour, linewidth=1.8, label=stage)
+            evaluation, labels = (
+                part.evaluation.values + 1,
+                ("candidate", "lowest so far") if not found else (None, None),
+            )
+            axes.plot(evaluation, part.cost, ".", color="0.6", markersize=3.5, label=labels[0])
+            axes.plot(evaluation, part.best, color="0.1", linewidth=1.8, label=labels[1])
+            axes.axvline(evaluation[0] - 0.5, color="0.4", linestyle=":", linewidth=1.0)
+            axes.text(evaluation[0], 1.0, f" {stage}", va="top", fontsize=10)
+            found.append(f"{part.best.values[0]:.2f} to {part.best.values[-1]:.2f} in the {stage}")
     cost = history.cost.attrs["long_name"]
     label = f"{'FLSS' if cost == 'FLSS' else 'cost'} on the starts of the stage"
     axes.set(xlabel="evaluations of the cost function", ylabel=label, ylim=(-0.02, 1.02))
-    head(figure, in_figure(history.attrs["title"]))
+    named = f"{'FLSS' if cost == 'FLSS' else 'cost'}, lowest so far: {', '.join(found)}"
+    head(figure, named, in_figure(history.attrs["title"]), "" if cost == "FLSS" else f"cost: {cost}")
     tidy(axes)
-    below = "lines: lowest cost so far, dots: candidates" + ("" if cost == "FLSS" else f"\ncost: {cost}")
-    figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9, title=below, title_fontsize=8)
+    figure.legend(loc="outside lower center", ncols=2, **LEGEND)
     return figure

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from hexmj.controllers.registry import VARIED, load_controller
 from hexmj.errors import InputError
 from hexmj.measures.figures import caption
 from hexmj.measures.tables import differences, frequencies, over_cells, velocity_axis
-from hexmj.plotting import FEWER, NOTHING, head, heat_map, in_figure, picture, velocity_columns
+from hexmj.plotting import FEWER, NOTHING, head, heat_map, in_figure, picture
 from hexmj.studies.league import MOST_GAIT_STARTS
 from hexmj.studies.league_cells import ControllerStudy, EntrantWalks, short_names
 from hexmj.sweep import Cell
@@ -35,7 +36,10 @@ MEASURES = {
 }
 """Measure -> event whose frequency it is."""
 
-NOTES = f"* 95 % interval excludes 0; {NOTHING} no walk is left; {FEWER} walks diverged or were out of reach"
+NOTES = (
+    "without colour: frequency of the complete controller; coloured: change without or with a part, red means more\n"
+    f"* 95 % interval excludes 0; {NOTHING} no walk is left; {FEWER} walks diverged or were out of reach"
+)
 """Explanation of the marks in the cells of the figure."""
 
 
@@ -129,23 +133,28 @@ class Ablation(ControllerStudy):
 def ablation_figure(result: "xr.Dataset") -> "Figure":
     """Draw a row with the frequencies of each whole, and below it rows with the differences of changed controllers."""
     rows, columns = result.sizes["controller"], result.sizes["velocity"]
-    figure = picture(2.6 + 0.58 * len(MEASURES) * max(4, columns), 1.9 + 0.27 * rows)
-    panels = figure.subplots(1, len(MEASURES), sharey=True)
+    deep = 1 if columns <= 4 else 2  # rows of panels
+    figure = picture(10.0, 1.2 + deep * (0.8 + 0.2 * rows))
+    panels = figure.subplots(deep, len(MEASURES) // deep, sharey=True).ravel()
     wholes = result.controller.values == result.whole.values
     for panel, (measure, title) in zip(panels, MEASURES.items(), strict=True):
         data = result.sel(measure=measure).transpose("controller", "velocity", ...)
         texts = [cell_text(data.isel(controller=row, velocity=v)) for row, v in np.ndindex(rows, columns)]
         shown = np.where(wholes[:, None], np.nan, data.more.values)
-        heat_map(panel, shown, np.reshape(texts, (rows, columns)), cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-        panel.set_title(f"{measure}\n{title}", fontsize=9)
-        velocity_columns(panel, result.velocity.values)
+        heat_map(
+            panel, result.velocity.values, shown, np.reshape(texts, (rows, columns)), cmap="RdBu_r", vmin=-1.0, vmax=1.0
+        )
+        panel.set_title("\n".join(wrap(title, 24)), fontsize=9)
         for row in np.flatnonzero(result.whole.values[1:] != result.whole.values[:-1]):
             panel.axhline(row + 0.5, color="0.3", linewidth=0.8)
-    panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values])
-    heading = "What a part buys: frequencies of the whole, and differences without it"
+    panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values], fontsize=9)
+    falls = result.sel(measure="physical").transpose("controller", "velocity", ...)
+    row, v = np.unravel_index(np.nan_to_num(falls.more.values, nan=-1.0).argmax(), falls.more.shape)
+    change = f"{result.controller.values[row]}, {falls.more.values[row, v]:+.2f} at V = {result.velocity.values[v]:g}"
+    heading = f"largest rise of the frequency of falls: {change}"
     physical, gaits = result.attrs["physical_starts"], min(result.attrs["starts"], MOST_GAIT_STARTS)
     head(figure, heading, f"{caption(result)}; {physical} of them in physics, {gaits} for the gait")
-    figure.supxlabel(NOTES, fontsize=8)
+    figure.supxlabel(NOTES, fontsize=9)
     return figure
 
 

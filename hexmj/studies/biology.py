@@ -147,20 +147,20 @@ FIELDS = {"quantity": "name", "speed": "at", "low": "animal_low", "high": "anima
 HEADS = ("quantity", "ours (95 %)", "insects", "verdict on the mean", "source")
 """Column headings of the table."""
 
-OURS: dict[str, Any] = CURVE | {"color": "#1b6ca8"}
-INSECTS = "#e08e1b"
+OURS: dict[str, Any] = CURVE | {"color": SERIES[0]["color"]}
+INSECTS = "0.6"
 """Colour of the ranges of real insects; `OURS` is the style of the simulated insect."""
 
 OVER_SPEED = {
-    "phase, ipsilateral": "ipsilateral phase",
-    "duty factor": "duty factor",
-    "period": "period [s]",
-    "ripple: least over mean speed": "least over mean speed",
+    "phase, ipsilateral": "phase of neighbouring legs on a side",
+    "duty factor": "duty factor: share of a period in stance",
+    "period": "period of a stride [s]",
+    "ripple: least over mean speed": "lowest over mean speed of the trunk",
 }
 """Quantity drawn over speed -> label of its axis."""
 
 BARS = {
-    "force on both legs [% of the weight]": ("vertical impulse", "fore-aft impulse", "inward impulse"),
+    "force on both legs of a pair [% of the weight]": ("vertical impulse", "fore-aft impulse", "inward impulse"),
     "torque of a standing leg [mN mm]": tuple(f"{joint} torque" for joint in JOINTS),
 }
 """Label of an axis -> quantities whose bars stand side by side, for each pair of legs."""
@@ -279,17 +279,21 @@ def _range(low: float, high: float) -> str:
 
 def biology_figure(result: "xr.Dataset") -> "Figure":
     """Draw forces and torques as bars for each pair of legs, and gait over speed with the ranges of real insects."""
-    figure = picture(11.0, 6.4)
+    figure = picture(10.0, 6.4)
     axes = figure.subplots(2, 3).ravel()
     for panel, (label, names) in zip(axes[:2], BARS.items(), strict=True):
         _bars(panel, result.value.sel(speed=SPEED).transpose("quantity", "start"), names)
-        panel.set_ylabel(label)
+        panel.set_title(f"{label}", fontsize=9)
     for panel, (name, label) in zip(axes[2:], OVER_SPEED.items(), strict=True):
         _over_speed(panel, result.value.sel(quantity=name), name)
-        panel.set(ylabel=label, xlabel="speed [mm/s]")
+        panel.set_title(label, fontsize=9)
+        panel.set_xlabel("speed [mm/s]")
     axes[2].legend(**LEGEND)
-    title = f"The walking insect beside measured ones, means with 95 % intervals; bars at {SPEED:g} mm/s"
-    head(figure, title, f"{caption(result)}; whole strides: {walked_in_words(result)}")
+    verdicts = result.verdict.values.tolist()
+    known = sum(verdicts.count(word) for word in ("below", "within", "above"))
+    finding = f"{verdicts.count('within')} of {known} quantities are within the range of real insects"
+    shown = f"means with 95 % intervals; bars at {SPEED:g} mm/s; whole strides: {walked_in_words(result)}"
+    head(figure, finding, caption(result), shown)
     return figure
 
 
@@ -313,8 +317,8 @@ def _over_speed(axes: "Axes", values: "xr.DataArray", name: str) -> None:
         if row.quantity == name:
             ends = (row.speed - 0.4, row.speed + 0.4) if row.depends else (20.0, 40.0)
             axes.fill_between(ends, row.low, row.high, color=INSECTS, alpha=0.5, linewidth=0)
-    axes.errorbar(values.speed, *_means(values.transpose("speed", "start"), name), label="ours", **OURS)
-    axes.fill_between([], [], color=INSECTS, alpha=0.5, linewidth=0, label="insects")
+    axes.errorbar(values.speed, *_means(values.transpose("speed", "start"), name), label="simulated insect", **OURS)
+    axes.fill_between([], [], color=INSECTS, alpha=0.5, linewidth=0, label="range of real insects")
     axes.set_xlim(20.0, 40.0)
     tidy(axes)
 

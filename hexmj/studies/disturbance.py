@@ -38,11 +38,15 @@ PHYSICAL = ("push", "grasp")
 MOST_IMPULSE = 80.0
 """Maximum impulse of a push, in multiples of m V_p; a larger impulse throws the insect into the air."""
 
-SHIFTS = dict(zip(STYLES, np.linspace(-0.012, 0.012, len(STYLES)), strict=True))
+SHIFTS = dict(zip(STYLES, np.linspace(-0.02, 0.02, len(STYLES)), strict=True))
 """Strategy -> shift of its points in V_r / V_p, so that the points of one velocity do not overlap."""
 
-UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "marker": "x", "label": "undisturbed"}
-ROWS = {"kinematic": "kinematic", "physical": "falls (physical)"}
+ABOUT = "no strategy", "reorganise: next stable posture", "slow down, then accelerate", "grasp: feet adhere"
+LABELS = dict(zip(STYLES, ABOUT, strict=True))
+"""Strategy -> label of its curve."""
+
+UNDISTURBED: dict[str, Any] = {"color": "0.15", "linestyle": ":", "marker": "x", "label": "no disturbance"}
+ROWS = {"kinematic": "kinematic FLSS", "physical": "frequency of falls"}
 """Measure -> label of its row of panels."""
 
 
@@ -203,31 +207,48 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
     """Draw FLSS after the disturbance, within `whole`: a column for each disturbance and a row for each measure."""
     names, strategies = result.disturbance.values, result.strategy.values
     kinds, measures = list(dict.fromkeys(names[names != NO_DISTURBANCE])), [name for name in ROWS if name in result]
-    figure = picture(2.6 + 2.5 * len(kinds), 1.6 + 2.5 * len(measures))
+    figure = picture(max(7.0, 1.0 + 2.3 * len(kinds)), 1.3 + 2.2 * len(measures))
     panels = figure.subplots(len(measures), len(kinds), sharex=True, sharey=True, squeeze=False)
     data = result.sel(observation_time="whole").sortby("velocity")
-    v = data.velocity.values
+    v, empty = data.velocity.values, []
     for (row, column), axes in np.ndenumerate(panels):
         measure, kind = measures[row], kinds[column]
-        if row == 0:
-            axes.set_title(_title(kind), fontsize=10)
         if measure == "kinematic" and kind.startswith("push"):
             axes.axis("off")  # a push does not change the plan
+            empty.append(axes)
             continue
+        if row == 0 or panels[row - 1, column] in empty:
+            axes.set_title(_title(kind), fontsize=11)
         for case in np.flatnonzero(names == NO_DISTURBANCE):
             axes.plot(v, data[measure].isel(case=case), **UNDISTURBED, zorder=5)
         for case in np.flatnonzero((names == kind) & ((strategies != "grasp") | (measure == "physical"))):
-            style = STYLES[strategies[case]] | {"label": strategies[case].replace("_", " ")}
+            style = STYLES[strategies[case]] | {"label": LABELS[strategies[case]]}
             frequency_curve(axes, v + SHIFTS[strategies[case]], data.isel(case=case), measure, **style)
-        flss_axes(axes, v)
-        axes.set_ylabel(f"FLSS, {ROWS[measure]}")
+        flss_axes(axes, v, ROWS[measure])
         axes.label_outer()
+        axes.tick_params(labelleft=column == 0)
     least = min(int(data[f"{measure}_reached"].min()) for measure in measures)
     handles, _ = panels[-1, -1].get_legend_handles_labels()
-    figure.legend(handles=handles, **LEGEND, loc="outside right center", title="strategy")
-    words = "; ".join(filter(None, [caption(result, least), strategies_in_words(result)]))
-    head(figure, "FLSS after a disturbance in mid-walk, with 95 % intervals", words)
+    if empty:
+        note = {"title": "A push does not change the plan\nor its kinematic FLSS.\n", "title_fontsize": 9}
+        place: Any = {"loc": "center", "bbox_to_anchor": (len(empty) / 2, 0.5)}
+        empty[0].legend(handles=handles, **LEGEND, **note, **place).set_in_layout(False)
+    else:
+        figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=3)
+    shown = caption(result, least), strategies_in_words(result), "bars: 95 % intervals"
+    head(figure, _finding(data, measures[-1]), *shown)
     return figure
+
+
+def _finding(data: "xr.Dataset", measure: str) -> str:
+    """Return which strategies change a frequency, at some velocity, beyond its 95 % interval."""
+    found = []
+    for word, clear in ("fewer", data[f"{measure}_buys_low"] > 0.0), ("more", data[f"{measure}_buys_high"] < 0.0):
+        for strategy in dict.fromkeys(data.strategy.values[clear.any("velocity").values]):
+            after = data.disturbance.values[clear.any("velocity").values & (data.strategy.values == strategy)]
+            found.append(f"{word} with {strategy.replace('_', ' ')} ({', '.join(after)})")
+    event = "falls" if measure == "physical" else "losses"
+    return f"{event} are {'; '.join(found)}" if found else f"no strategy changes the number of {event} clearly"
 
 
 def _title(disturbance: str) -> str:

@@ -14,7 +14,7 @@ from hexmj.measures.compare import BESIDE, MEASURES
 from hexmj.measures.figures import caption
 from hexmj.measures.study import UNITS, Study, by_halves, kept_walk, standing_starts
 from hexmj.measures.tables import WalkSettings, differences, frequency, happened, over_start, velocity_axis
-from hexmj.plotting import LEGEND, head, heat_map, picture, velocity_columns
+from hexmj.plotting import LEGEND, NOTHING, SHARE, head, heat_map, picture
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 from hexmj.studies.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
@@ -55,20 +55,20 @@ body's own centre of mass; `kinematic` counts those around O, which are the same
 BLOCK = 100
 """Number of starts walked at a time; all steps of their walks are in memory, 0.5 GB at V = 0.1."""
 
-LOOKS: dict[str, tuple[str, str | None]] = {
-    "never_lost": ("#e4e4e4", None),
-    "still_standing": ("#cde8c9", None),
-    "too_short": ("#8fce8a", None),
-    "landed_in_time": ("#46a35e", None),
-    "caught": ("#14663a", None),
-    "tipped_behind": ("#f5a25d", "//"),
-    "tipped_ahead": ("#f6d55c", "\\\\"),
-    "thrown": ("#b3261e", "xx"),
-    "unplanned": ("#6a4c93", ".."),
-    "narrow": ("#b79bd6", "--"),
+LOOKS: dict[str, tuple[str, str | None, str]] = {
+    "never_lost": ("#e4e4e4", None, "no planned loss, no fall"),
+    "still_standing": ("#cde8c9", None, "saved: feet that carry load never lost it"),
+    "too_short": ("#8fce8a", None, "saved: trunk never tipped"),
+    "landed_in_time": ("#46a35e", None, "saved: planned feet landed in time"),
+    "caught": ("#14663a", None, "saved: caught by a swinging foot"),
+    "tipped_behind": ("#f5a25d", "//", "fell backwards at a planned loss"),
+    "tipped_ahead": ("#f6d55c", "\\\\", "fell ahead at a planned loss"),
+    "thrown": ("#b3261e", "xx", "fell: thrown over by a leg"),
+    "unplanned": ("#6a4c93", "..", "fell at a wide planned margin"),
+    "narrow": ("#b79bd6", "--", "fell at a narrow planned margin"),
 }
-"""Mechanism -> colour and hatch: grey without loss and fall, green for a survived loss, red to yellow for a fall after
-a planned loss, violet for another fall. Falls are hatched, for readers without colours."""
+"""Mechanism -> colour, hatch, label: grey without loss and fall, green for a survived loss, red to yellow for a fall
+after a planned loss, violet for another fall. Falls are hatched, for readers without colours."""
 
 
 @dataclass(frozen=True)
@@ -216,64 +216,82 @@ def froude(conditions: Conditions, velocity: np.ndarray) -> np.ndarray:
 
 
 def map_figure(result: "xr.Dataset") -> "Figure":
-    """Draw two heat maps over velocity and condition: physical FLSS, and the fraction of static losses without a fall.
+    """Draw two heat maps over velocity and condition: falls, and the fraction of static losses without a fall.
 
     The lowest row shows the kinematic FLSS, which is the same under all conditions."""
     result = result.transpose("value", "velocity", "start", ...)
     rows, columns = result.sizes["value"], result.sizes["velocity"]
-    figure = picture(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.62 * (rows + 1))
+    figure = picture(max(8.0, 2.4 + 2.0 * columns), 1.9 + 0.5 * (rows + 1))
     panels = figure.subplots(1, 2, sharey=True)
     unknown = np.full((1, columns), np.nan)  # no condition changes kinematic walks
     falls = np.concatenate([result.kinematic.values[:1], result.physical.values])
     words = [[f"{number:.2f}" for number in row] for row in falls]
-    lost = np.isfinite(result.static_loss.values).sum(axis=-1)
-    counts = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name").values
-    of_lost = [[""] * columns] + [
-        [f"{n} of {total}" if total else "none lost" for n, total in zip(*row, strict=True)]
-        for row in zip(counts, lost, strict=True)
-    ]
+    counts = zip(*(table.values.ravel() for table in _saved(result)), strict=True)
+    of_lost = np.reshape([""] * columns + [f"{n}/{all_of}" if all_of else NOTHING for n, all_of in counts], falls.shape)
     drawn = {
-        "physical FLSS": (falls, words, "YlOrRd"),
-        "saved by dynamics, of the static losses": (np.concatenate([unknown, result.saved.values]), of_lost, "YlGn"),
+        "frequency of falls": (falls, words, "YlOrRd"),
+        "static losses survived / all": (np.concatenate([unknown, result.saved.values]), of_lost, "YlGn"),
     }
     for axes, (title, (numbers, texts, colours)) in zip(panels, drawn.items(), strict=True):
-        heat_map(axes, numbers, np.array(texts), cmap=colours, vmin=0.0, vmax=1.0, origin="lower")
+        heat_map(
+            axes, result.velocity.values, numbers, np.array(texts), cmap=colours, vmin=0.0, vmax=1.0, origin="lower"
+        )
         axes.axhline(0.5, color="white", linewidth=9.0)
         axes.set_title(title, fontsize=11)
-        velocity_columns(axes, result.velocity.values)
-    panels[0].set_yticks(range(rows + 1), ["kinematic", *(f"{value:g}" for value in result.value.values)])
+    panels[0].set_yticks(range(rows + 1), ["kinematic FLSS", *(f"{value:g}" for value in result.value.values)])
     panels[0].set_ylabel(_label(result))
-    head(figure, "Falls in physics, and starts that dynamics saves", _caption(result))
+    widest = result.isel(velocity=int(np.ptp(np.nan_to_num(result.physical.values[[0, -1]]), axis=0).argmax()))
+    finding = f"at V = {widest.velocity:g}, the frequency of falls is {_ends(widest.physical)}"
+    static = f"static loss: the body's centre of mass leaves the planned polygon; {NOTHING} none"
+    head(figure, finding, _caption(result), static)
     return figure
 
 
 def mechanisms_figure(result: "xr.Dataset") -> "Figure":
     """Draw the fraction of starts with each mechanism as stacked bars over the condition, a panel for each velocity."""
+    result = result.transpose("value", "velocity", "start", ...)
     columns, values = result.sizes["velocity"], range(result.sizes["value"])
-    figure = picture(max(8.0, 2.6 + 2.3 * columns), 4.6)
+    figure = picture(max(8.0, 3.6 + 1.7 * columns), 4.6)
     panels = figure.subplots(1, columns, sharey=True, squeeze=False)[0]
     for panel, v in zip(panels, result.velocity.values, strict=True):
         shares, bottom = result["count"].sel(velocity=v) / result.sizes["start"], np.zeros(len(values))
-        for name, (colour, hatch) in LOOKS.items():
+        for name, (colour, hatch, label) in LOOKS.items():
             share = shares.sel(mechanism_name=name).values
             style = {"color": colour, "hatch": hatch, "edgecolor": "0.25", "linewidth": 0.0}
-            panel.bar(values, share, 0.82, bottom, label=name.replace("_", " "), **style)
+            panel.bar(values, share, 0.82, bottom, label=label, **style)
             bottom = bottom + share
         panel.set_title(f"V = {v:g}", fontsize=11)
-        panel.set_xticks(values, [f"{value:g}" for value in result.value.values])
+        panel.set_xticks(values, [f"{value:g}" for value in result.value.values], fontsize=9)
         panel.set(ylim=(0.0, 1.0), xlabel=_label(result).replace(" [", "\n["))
         panel.spines[["top", "right"]].set_visible(False)
-    panels[0].set_ylabel("starts (hatched: fell)")
+    panels[0].set_ylabel(SHARE)
     handles, _ = panels[0].get_legend_handles_labels()
     figure.legend(handles=handles[::-1], **LEGEND, loc="outside right center")
-    head(figure, "What happened to every start", _caption(result))
+    saved, lost = (table.sum("velocity") for table in _saved(result))
+    share = f"the share of static losses that end without a fall is {_ends(saved / lost)}"
+    head(figure, share, _caption(result), "hatched: fell")
     return figure
 
 
+def _saved(result: "xr.Dataset") -> tuple["xr.DataArray", "xr.DataArray"]:
+    """Return the numbers of starts that survive a static loss and of all with a static loss, (value, velocity)."""
+    saved = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name")
+    return saved, saved.copy(data=np.isfinite(result.static_loss.values).sum(axis=-1))
+
+
+def _ends(numbers: "xr.DataArray") -> str:
+    """Return the first and the last of the numbers over the condition, as a text."""
+    name, _, unit = _label(numbers).removeprefix("swing velocity ").removesuffix("]").partition(" [")
+    values = numbers.value.values
+    return " and ".join(f"{numbers.values[i]:.2f} at {name} = {values[i]:g} {unit}".strip() for i in (0, -1))
+
+
 def _caption(result: "xr.Dataset") -> str:
-    return f"{caption(result)}; {result.sizes['start']} of them stand and reach nine of ten tips at every value"
+    number = result.sizes["start"]
+    left = "" if number == result.attrs["starts"] else f"; {number} of them stand and reach nine of ten tips everywhere"
+    return caption(result) + left
 
 
-def _label(result: "xr.Dataset") -> str:
+def _label(result: "xr.Dataset | xr.DataArray") -> str:
     name, unit = result.value.attrs["long_name"], result.value.attrs["units"]
     return name.replace("V_p", "$V_p$") + (f" [{unit}]" if unit != "1" else "")

@@ -21,7 +21,7 @@ from hexmj.measures.compare import with_flss
 from hexmj.measures.figures import caption
 from hexmj.measures.study import Study, kept_walk
 from hexmj.measures.tables import WalkSettings, over_start
-from hexmj.plotting import LEGEND, MEASURE_STYLES, frequency_curve, head, picture, tidy
+from hexmj.plotting import LEGEND, MEASURE_STYLES, SHARE, frequency_curve, head, picture, tidy
 from hexmj.stability import loss_time, stability_margin, walk_margin
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration
@@ -62,35 +62,29 @@ FINE = Conditions(longest_substep=0.5)
 LINES = ("-", "--", ":", "-.")
 """Line styles of the masses of the legs, in this order."""
 
-STYLES: dict[str, dict[str, Any]] = {
-    "measured": {"color": "#e08e1b", "marker": "s"},
-    "grounded": {"color": "#46a35e", "marker": "D"},
-    "physical": {"color": "#b3261e", "marker": "^"},
-    "centre of pressure": {"color": "0.6", "marker": "v"},
-    "measured, same feet stand": {"color": "#6a4c93", "marker": "o"},
-    "": {"color": "#1b6ca8", "marker": "o"},
+STYLES: dict[str, dict[str, Any]] = MEASURE_STYLES | {
+    "pressure": {"color": "0.55", "marker": "v", "label": "centre of pressure"},
+    "same_feet": {"color": "#e7b97c", "marker": "s", "label": "measured, while the planned feet stand"},
+    "drift": {"color": "0.15", "marker": "o"},
 }
-"""Label of a curve in a legend -> its style."""
+"""Curve -> its style."""
 
 PANELS = {
-    "FLSS": {"measured": "measured", "grounded": "grounded", "physical": "physical"},
-    "starts with the kinematic answer": {
+    SHARE: {"measured": "measured", "grounded": "grounded", "physical": "physical"},
+    "agreement with kinematic losses": {
         "agreement_measured": "measured",
         "agreement_grounded": "grounded",
         "agreement": "physical",
     },
     "distance from the planned margin [mm]": {
-        "margin_pressure": "centre of pressure",
+        "margin_pressure": "pressure",
         "margin": "measured",
         "margin_grounded": "grounded",
-        "margin_same_feet": "measured, same feet stand",
+        "margin_same_feet": "same_feet",
     },
-    "centre of mass from O [mm]": {"drift": ""},
+    "centre of mass from O [mm]": {"drift": "drift"},
 }
-"""Label of a panel's axis -> the variables drawn in the panel, with their labels in the legend."""
-
-ABOVE = LEGEND | {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "fontsize": 8, "ncols": 2}
-"""Options that place a legend above its panel."""
+"""Label of a panel's axis -> the variables drawn in the panel, and their styles."""
 
 
 @dataclass(frozen=True)
@@ -229,32 +223,40 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
     """Draw FLSS, agreement, margins and drift against V_p, with a line style for each mass of the legs."""
     from matplotlib.lines import Line2D
 
-    figure = picture(9.6, 7.6)
+    figure, result = picture(10.0, 7.4), result.sortby("vp")
     panels, masses, vps = figure.subplots(2, 2, sharex=True).ravel(), result.leg_mass.values, result.vp.values
-    lines: dict[float, Any] = dict(zip(masses, LINES * len(masses), strict=False))
-    alone = result.isel(leg_mass=0, vp=0)  # kinematic FLSS depends on neither
-    style = {"color": MEASURE_STYLES["kinematic"]["color"]}
-    panels[0].axhspan(alone.kinematic_low.item(), alone.kinematic_high.item(), alpha=0.15, linewidth=0, **style)
-    panels[0].axhline(alone.kinematic.item(), linewidth=1.6, label="kinematic", **style)
+    alone, style = result.isel(leg_mass=0, vp=0), STYLES["kinematic"] | {"marker": None}  # kinematic FLSS has one value
+    panels[0].axhspan(alone.kinematic_low.item(), alone.kinematic_high.item(), alpha=0.15, color=style["color"], lw=0)
+    handles = {"kinematic": panels[0].axhline(alone.kinematic.item(), **style)}
     for axes, (title, curves) in zip(panels, PANELS.items(), strict=True):
-        for mass, line in lines.items():
-            data = result.sel(leg_mass=mass).sortby("vp")
-            for name, label in curves.items():
-                style = STYLES[label] | {"linestyle": line, "label": label if mass == masses[0] and label else None}
-                if title == "FLSS":
-                    frequency_curve(axes, data.vp, data, name, **style)
-                else:
-                    values = data[name] if "start" not in data[name].dims else data[name].mean("start")
-                    axes.plot(data.vp, values, markersize=4.5, linewidth=1.6, **style)
+        shifts = 2.0 ** (0.08 * (np.arange(len(masses) * len(curves)) - (len(masses) * len(curves) - 1) / 2))
+        for (curve, mass), shift in zip(product(curves.items(), range(len(masses))), shifts, strict=True):
+            (name, look), data = curve, result.isel(leg_mass=mass)
+            style = STYLES[look] | {"linestyle": LINES[mass % len(LINES)]}
+            if title == SHARE:
+                frequency_curve(axes, vps * shift, data, name, **style)
+            else:
+                values = data[name] if "start" not in data[name].dims else data[name].mean("start")
+                (drawn,) = axes.plot(vps, values, markersize=4.5, linewidth=1.6, **style)
+                handles.setdefault(look, drawn)
         axes.set(ylabel=title, xscale="log", ylim=(0.0, None) if "[mm]" in title else (-0.02, 1.02))
         axes.set_xticks(vps, [f"{vp:g}" for vp in vps])
         axes.minorticks_off()
         tidy(axes)
-    for axes in panels[:3]:
-        axes.legend(**ABOVE)
     for axes in panels[2:]:
-        axes.set_xlabel("$V_p$ [mm/s]; slow walks on the left")
-    handles = [Line2D([], [], color="0.1", linestyle=line, label=f"legs' mass x {m:g}") for m, line in lines.items()]
-    panels[3].legend(handles=handles, **ABOVE)
-    head(figure, f"As $V_p$ goes to zero, V = {result.attrs['velocity']:g}, with 95 % intervals", caption(result))
+        axes.set_xlabel("$V_p$ [mm/s], logarithmic")
+    lines = zip(masses, LINES * len(masses), strict=False)
+    black = [Line2D([], [], color="0.1", linestyle=line, label=f"mass of the legs x {mass:g}") for mass, line in lines]
+    named = [drawn for name, drawn in handles.items() if name != "drift"]
+    figure.legend(handles=[*named, *black], **LEGEND, loc="outside lower center", ncols=3)
+    agreement = result.agreement.isel(leg_mass=0).values
+    agree = " and ".join(f"{agreement[i]:.2f} at $V_p$ = {vps[i]:g} mm/s" for i in (0, -1))
+    notes = "bars and band: 95 % intervals", f"close to ground: below {GROUNDED:g} standing heights"
+    head(
+        figure,
+        f"agreement of falls with planned losses: {agree}",
+        f"V = {result.attrs['velocity']:g}",
+        caption(result),
+        *notes,
+    )
     return figure

@@ -160,24 +160,29 @@ def _size(conditions: Conditions) -> float:
 
 
 def terrain_figure(result: "xr.Dataset") -> "Figure":
-    """Draw FLSS against obstacle size: a column for each kind of ground, a row for each adhesion, flat ground at 0."""
+    """Draw falls against obstacle size: a column for each kind of ground, a row for each adhesion, flat ground at 0."""
     ground, grasps, speeds = result.ground.values, result.grasp.values, result.velocity.values
     kinds = list(dict.fromkeys(ground[ground != "flat"]))
-    figure = picture(max(4.8, 1.0 + 2.8 * len(kinds)), 1.3 + 2.6 * len(grasps))
+    figure = picture(max(6.0, 1.0 + 2.8 * len(kinds)), 1.4 + 2.4 * len(grasps))
     panels = figure.subplots(len(grasps), len(kinds), sharey=True, sharex="col", squeeze=False)
     for (row, column), axes in np.ndenumerate(panels):
         chosen = np.flatnonzero(np.isin(ground, ("flat", kinds[column])))
         data = result.sel(grasp=grasps[row]).isel(obstacle=chosen).sortby("size")
         sizes = data["size"].values
-        shifts = (np.arange(len(speeds)) - (len(speeds) - 1) / 2) * 0.02 * sizes.max()
+        shifts = (np.arange(len(speeds)) - (len(speeds) - 1) / 2) * 0.03 * sizes.max()
         for v, style, shift in zip(speeds, SERIES * len(speeds), shifts, strict=False):
             frequency_curve(axes, sizes + shift, data.sel(velocity=v), "flss", label=f"V = {v:g}", **style)
-        axes.set(ylim=(-0.02, 1.02), xlabel=SIZES[kinds[column]], ylabel=f"FLSS, grasp {grasps[row]:g}")
+        axes.set(
+            ylim=(-0.02, 1.02), xlabel=SIZES[kinds[column]], ylabel=f"frequency of falls\nadhesion {grasps[row]:g}"
+        )
         axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
         axes.label_outer()
         tidy(axes)
     handles, _ = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=len(handles))
-    title = "Falls once the obstacle has been reached, with 95 % intervals"
-    head(figure, title, caption(result, int(result.reached.min())))
+    falls = result.flss.mean(["grasp", "velocity"]).values
+    ends = zip(("fewest", "most"), (int(np.nanargmin(falls)), int(np.nanargmax(falls))), strict=True)
+    finding = "; ".join(f"{word} falls: {result.obstacle.values[n]} ({falls[n]:.2f})" for word, n in ends)
+    shown = "falls after the obstacle is reached, mean over the curves; size 0: flat ground; bars: 95 % intervals"
+    head(figure, finding, caption(result, int(result.reached.min())), shown)
     return figure

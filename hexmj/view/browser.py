@@ -18,6 +18,7 @@ from hexmj.bodies.mjcf import compile_body
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
+from hexmj.plotting import MEASURE_STYLES
 from hexmj.rendering.scene_marks import CENTRE, STABLE, TIP, UNSTABLE
 from hexmj.rendering.shapes import body_shapes, ground_shape
 from hexmj.replay.take import margin_in_words, support_on_ground
@@ -40,8 +41,6 @@ RANGES = {
 
 SWITCHES = ("p2", "p4_i")
 """Weights that are on (1) or off (0), and have check boxes instead of sliders."""
-
-MEASURED, PLANNED = "#c8740a", "#1b6ca8"
 
 
 def check_port(host: str, port: int) -> None:
@@ -156,11 +155,11 @@ class BrowserView:
             buttons = gui.add_button_group("", tuple(restarts))
             buttons.on_click(lambda _: self._change(lambda _: restarts[buttons.value]()))
         with gui.add_folder("Push"):
-            impulse = gui.add_slider("to the left [m V_p]", -60.0, 60.0, 1.0, IMPULSE)
+            impulse = gui.add_slider("impulse", -60.0, 60.0, 1.0, IMPULSE, hint="to the left [m V_p]")
             gui.add_button("Push").on_click(lambda _: self._change(lambda walk: walk.push(float(impulse.value))))
         controller = walk.controller
         if isinstance(controller, Cruse1998) and isinstance(controller.weights, Symmetric):
-            with gui.add_folder("Weights of the network, from the next step on", expand_by_default=False):
+            with gui.add_folder("Weights of the network", expand_by_default=False):
                 self._make_weights(controller, controller.weights)
 
     def _make_weights(self, controller: Cruse1998, weights: Symmetric) -> None:
@@ -246,9 +245,9 @@ class BrowserView:
         from viser import uplot
 
         series = (
-            uplot.Series(label="s"),
-            uplot.Series(label="measured", stroke=MEASURED, width=2),
-            uplot.Series(label="planned", stroke=PLANNED, width=1, dash=(4, 3)),
+            uplot.Series(label="time [s]"),
+            uplot.Series(label="measured", stroke=MEASURE_STYLES["measured"]["color"], width=2),
+            uplot.Series(label="planned", stroke=MEASURE_STYLES["kinematic"]["color"], width=1, dash=(4, 3)),
         )
         options: Any = {"scales": {"x": uplot.Scale(time=False)}, "aspect": 2.2}
         gui = self.server.gui
@@ -270,4 +269,4 @@ class BrowserView:
         margins = (np.array([getattr(moment, name) for moment in shown]) for name in ("margin", "planned_margin"))
         self._margins.data = (seconds, *(np.where(np.isfinite(margin), margin, np.nan) for margin in margins))
         swings, vp = ~np.array([moment.stance for moment in shown]), walk.conditions.vp
-        self._footfall.content = footfall_html("", seconds * vp, swings, "the same time")
+        self._footfall.content = footfall_html("", seconds * vp, swings, "", 340)

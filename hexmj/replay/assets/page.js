@@ -330,7 +330,7 @@ function drawMarks(canvas, scene, recording, pose, row, theme) {
     draw.beginPath();
     draw.arc(u, v, 3, 0, 2 * Math.PI);
     draw.lineWidth = 1.5;
-    draw.strokeStyle = draw.fillStyle = theme.css.measured;
+    draw.strokeStyle = draw.fillStyle = recording.physical ? theme.css.measured : theme.css.planned;
     if (stands) draw.fill(); else { draw.fillStyle = theme.css.paper; draw.fill(); draw.stroke(); }
     const away = Math.hypot(u - middle[0], v - middle[1]) || 1;
     const a = u + 20 * (u - middle[0]) / away, b = v + 20 * (v - middle[1]) / away;
@@ -417,7 +417,7 @@ class Chart {
       draw.fillStyle = css.planned;
       const main = recording.physical ? 0.6 * leg : 0.8 * leg;
       if (recording.physical) this.bars(draw, off(recording.planned_stance), y + 0.72 * leg, 0.18 * leg);
-      draw.fillStyle = css.ink;
+      draw.fillStyle = recording.physical ? css.measured : css.planned;
       this.bars(draw, off(recording.stance), y + 0.1 * leg, main - 0.05 * leg);
     });
     const known = [...recording.planned_margin, ...recording.margin].filter(Number.isFinite);
@@ -548,6 +548,7 @@ class Panel {
     this.part("legend").textContent = recording.physical
       ? "bars: foot off the ground; thin: planned swing. Margin: line measured, dashes planned; hatched: outside the polygon"
       : "bars: planned swing. Margin: dashes planned; hatched: outside the polygon";
+    if (!recording.physical) this.root.style.setProperty("--measured", "var(--planned)");
     this.chart = new Chart(this.part("chart"), recording);
     const tips = item(recording.tips, 0), centre = item(recording.centre_of_mass, 0);
     this.size = Math.max(...[0, 1, 2, 3, 4, 5].map((leg) => Math.hypot(tips[3 * leg] - centre[0], tips[3 * leg + 1] - centre[1])));
