@@ -57,9 +57,6 @@ SERIES: tuple[dict[str, Any], ...] = (
 )
 """Styles, in this order, of curves for something else than a measure of stability: a strategy, or a velocity."""
 
-SHARE = "share of the starts"
-"""Label of an axis of frequencies."""
-
 VELOCITY = "velocity $V_r / V_p$"
 """Label of a velocity axis."""
 
@@ -121,25 +118,21 @@ def picture(width: float, height: float) -> "Figure":
 
 def head(figure: "Figure", finding: str, *conditions: str) -> None:
     """Write a finding in bold above a figure and its conditions below the finding. Empty texts are left out."""
-    width, height = 72.0 * figure.get_size_inches()
-    top, words = height - 7.0, "; ".join(filter(None, conditions))
-    for text, size, broad, colour in (
-        (finding[:1].upper() + finding[1:], 11.0, 0.62, "0.0"),
-        (words, 9.0, 0.53, "0.3"),
-    ):
-        lines, weight = wrap(text, int(width / (broad * size))), "bold" if text != words else "normal"
-        style: Any = {"ha": "center", "va": "top", "fontsize": size, "fontweight": weight, "color": colour}
-        figure.text(0.5, top / height, "\n".join(lines), **style)
-        top -= 1.35 * size * len(lines) + 2.0
-    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, top / height))
+    (width, height), top = 72.0 * figure.get_size_inches(), 7.0
+    title, hard = finding[:1].upper() + finding[1:], "\N{NO-BREAK SPACE}"
+    words = "; ".join(filter(None, conditions)).replace(" ", hard).replace(f";{hard}", "; ").replace(f",{hard}", ", ")
+    for text, size, letter, weight, colour in ((title, 11.0, 0.62, "bold", "0.0"), (words, 9.0, 0.53, "normal", "0.3")):
+        style: Any = {"ha": "center", "va": "top", "fontweight": weight, "fontsize": size, "color": colour}
+        lines = wrap(text, int(width / (letter * size)))
+        figure.text(0.5, 1.0 - top / height, "\n".join(lines), **style)
+        top += 1.35 * size * len(lines) + 2.0
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - top / height))
 
 
 def where(v: np.ndarray, holds: np.ndarray) -> str:
-    """Return in words at which velocities, (velocity,) in increasing order, something holds, such as "at V = 0.5"."""
-    at = [f"{one:g}" for one in v[holds]]
-    text = f"at V = {', '.join(at)}" if at else "at no V"
-    if len(at) > 1 and holds[-len(at) :].all():
-        text = "at every V" if holds.all() else f"from V = {at[0]} on"
+    """Return in words at which of the increasing velocities, (velocity,), something holds, such as "at V = 0.5"."""
+    at, last = [f"{one:g}" for one in v[holds]], bool(holds[v.size - holds.sum() :].all())
+    text = f"from V = {at[0]} on" if last and len(at) > 1 else f"at V = {', '.join(at)}" if at else "at no V"
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
@@ -154,7 +147,7 @@ def tidy(axes: "Axes") -> None:
     axes.grid(color="0.9", linewidth=0.8)
 
 
-def flss_axes(axes: "Axes", velocities: np.ndarray, label: str = SHARE) -> None:
+def flss_axes(axes: "Axes", velocities: np.ndarray, label: str = "share of the starts") -> None:
     """Set labels, limits and ticks of axes that show frequencies against velocities, (velocity,)."""
     low, high = max(-BESIDE, velocities.min() - 0.1), min(1.0 + BESIDE, velocities.max() + 0.1)
     axes.set(xlabel=VELOCITY, xlim=(low, high), ylabel=label, ylim=(-0.02, 1.02))

@@ -93,4 +93,6 @@ def test_other_model_variants_are_named_in_the_title() -> None:
     study = Ablation(wholes(["lasting", "walknet"]), (0.5,), n_starts=2, physical_starts=1, periods=12)
     lost = xr.Dataset(dict.fromkeys(("lost", "fell", "stable"), ("start", [0, 1])))
     result = study.result([lost for _ in study.cells()])
-    assert "lasting (model variant lasting)" in hexmj.plot(result).texts[1].get_text()
+    assert "lasting (model variant lasting)" in hexmj.plot(result).texts[1].get_text().replace(
+        "\N{NO-BREAK SPACE}", " "
+    )

@@ -181,7 +181,7 @@ def test_texts_are_legible_on_a_slide_of_10_inches(name: str) -> None:
     for which in FIGURES[name]:
         figure = hexmj.plot(made(name), which)
         texts = [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
-        assert min(text.get_fontsize() for text in texts) * 10.0 / figure.get_figwidth() >= 9.0
+        assert min(float(text.get_fontsize()) for text in texts) * 10.0 / figure.get_figwidth() >= 9.0
 
 
 @pytest.mark.parametrize(("planned", "fell", "words"), [(1, 0, "at V = 0.5"), (0, 1, "at no V"), (1, 1, "at no V")])

@@ -131,8 +131,8 @@ def flss_figure(result: "xr.Dataset") -> "Figure":
     axes = figure.subplots()
     frequency_curve(axes, data.velocity, data, "flss", **MEASURE_STYLES[kind])
     flss_axes(axes, result.velocity.values, label)
-    ends = data.isel(velocity=[0, -1][: data.sizes["velocity"]])
-    values = " and ".join(f"{f:.2f} at V = {v:g}" for f, v in zip(ends.flss.values, ends.velocity.values, strict=True))
+    ends = (data.isel(velocity=i) for i in [0, -1][: data.sizes["velocity"]])
+    values = " and ".join(f"{end.flss:.2f} at V = {end.velocity:g}" for end in ends)
     head(figure, f"the {label} is {values}", caption(result), "bars: 95 % intervals")
     return figure
 

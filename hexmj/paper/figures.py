@@ -95,9 +95,9 @@ def phase_figure(measured: Measurements, model: str) -> "tuple[Figure, xr.Datase
         for leg, label in zip(RELATIVE, ("Gait II (Wilson)", None), strict=True):
             axes.plot(v, data.wilson.sel(leg=leg), "x", color=IDEAL, markersize=8, zorder=3, label=label)
     axes.set(xlabel="velocity $V$", ylabel="relative phase", xlim=(0, 1), ylim=(0, 1))
-    number, ends = {"hws": 5, "ldvs": 6}[model], " and ".join(f"{peak[0, n]:.2f} at V = {v[n]:g}" for n in (0, -1))
-    starts = f"Fig. {number} of the paper: phases of stable steady-state gaits; {gaits.sizes['start']} starts at each V"
-    head(figure, f"{model.upper()}: the main phase of leg 2 is {ends}", starts, "lines: main peak")
+    ends = " and ".join(f"{peak[0, n]:.2f} at V = {v[n]:g}" for n in (0, -1))
+    starts = f"phases of stable steady-state gaits; {gaits.sizes['start']} starts at each V; lines: main peaks"
+    head(figure, f"{model.upper()}: the main phase of leg 2 is {ends}", starts)
     axes.legend(frameon=False, fontsize=10)
     return figure, data
 
@@ -144,11 +144,7 @@ def footfall_diagrams(measured: Measurements, model: str) -> "tuple[Figure, xr.D
         axes.tick_params(axis="y", length=0, labelsize=9)
         axes.axhline(2.5, color="0.8", linewidth=0.8)
         axes.text(1.01, 0.5, f"$V$ = {v:g}", transform=axes.transAxes, va="center", fontsize=11)
-    head(
-        figure,
-        f"{model.upper()}: footfalls at {len(panels)} velocities",
-        "upper three rows: left legs" * (LEGS[0][0] == "L"),
-    )
+    head(figure, f"{model.upper()}: footfalls at {len(panels)} velocities", "L left, R right, 1 front, 3 hind")
     panels[-1].set_xlabel("time [periods of a single leg, $20\\,(1 + 1/V)$];  bars: protraction")
     return figure, data
 
@@ -175,10 +171,8 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
     axes.set(xlabel="velocity $V$", ylabel="kinematic FLSS", xlim=(0, 1), ylim=(-0.02, 1.04))
     model = list(curves)[1]
     lower = where(data.velocity.values, (data.flss.sel(curve=model) < data.flss[0]).values)
-    shown = f"Fig. {number} of the paper; observation time '{observation_time}'; means of {data.attrs['samples']}"
-    head(
-        figure, f"{curves[model][0]}: lower FLSS than without coordination {lower}", shown, "bars: standard deviations"
-    )
+    shown = f"Fig. {number}; observation time '{observation_time}'; {data.attrs['samples']}; bars: standard deviations"
+    head(figure, f"{curves[model][0]}: lower FLSS than without coordination {lower}", shown)
     axes.legend(frameon=False, fontsize=10)
     return figure, data
 

@@ -16,7 +16,6 @@ STRONGER = 1.8
 
 CENTRE = (0.98, 0.72, 0.10)
 TIP = (0.13, 0.36, 0.72)
-STANDS, SWINGS = (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)
 
 EMISSION = 0.3
 """Fraction of a mark's colour that does not depend on the light."""
@@ -51,8 +50,8 @@ def mark_planned_tips(scene: mujoco.MjvScene, marks: Marks, tips: np.ndarray) ->
 def mark_feet(scene: mujoco.MjvScene, marks: Marks, feet: np.ndarray, stance: np.ndarray) -> None:
     """Mark feet at `feet`, (leg, 3) [mm]: those that stand, (leg,), black, the others white."""
     for foot, stands in zip(feet, stance, strict=True):
-        colour = (*(STANDS if stands else SWINGS), 1.0)
-        _add(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, marks.tip), foot, np.eye(3), colour)
+        shade = 0.1 if stands else 1.0
+        _add(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, marks.tip), foot, np.eye(3), (shade, shade, shade, 1.0))
 
 
 def _rod(scene: mujoco.MjvScene, a: np.ndarray, b: np.ndarray, radius: float, rgba: tuple) -> None:

@@ -10,7 +10,7 @@ from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from hexmj.legs import LEGS
 from hexmj.plotting import MEASURE_STYLES
-from hexmj.rendering.scene_marks import CENTRE, STABLE, STANDS, SWINGS, TIP
+from hexmj.rendering.scene_marks import CENTRE, STABLE, TIP
 from hexmj.replay.film import Film
 from hexmj.replay.take import Take, margin_in_words
 
@@ -65,7 +65,7 @@ class Overlay:
     def _strip(self, background: np.ndarray, scale: float) -> np.ndarray:
         """Return `background` with the legend, and a scale bar of a round length at the centre of mass."""
         image, font, edge = _faded(background, 0.6), _font(self._pixels(11)), self._pixels(10)
-        image.paste(self._legend, (image.width - edge - self._legend.width, 0), self._legend)
+        image.paste(self._legend, (image.width - self._legend.width, 0), self._legend)
         draw, middle = ImageDraw.Draw(image), image.height // 2
         if scale > 0:
             longest = self._pixels(BAR) / scale
@@ -79,30 +79,19 @@ class Overlay:
         return np.asarray(image)
 
     def _marks(self) -> Image.Image:
-        """Return the legend of the marks in the scene and of the diagram's bars, drawn large and then reduced."""
-        size, font = 4 * self._pixels(STRIP), _font(4 * self._pixels(11))
-        image = Image.new("RGBA", (40 * size, size))
-        draw, right, middle, radius = ImageDraw.Draw(image), 0.0, size / 2, size / 4
-        named = {
-            "foot stands": STANDS,
-            "foot swings": SWINGS,
-            "planned tip": TIP,
-            "support polygon": STABLE,
-            "centre of mass": CENTRE,
-        }
-        for name, shades in named.items():
-            colour = tuple(round(255 * shade) for shade in shades)
-            if name == "foot swings":  # its bar, too
-                draw.rectangle((right, middle - radius / 2, right + 3 * radius, middle + radius / 2), self._swing)
-                right += 3.6 * radius
-            high = radius / (2 if name == "planned tip" else 1)
-            place = (right, middle - high, right + 2 * radius, middle + high)
-            (draw.rectangle if name == "support polygon" else draw.ellipse)(place, colour, INK, max(1, size // 24))
-            right += 2.8 * radius
-            draw.text((right, middle), name, INK, font, "lm")
-            right += draw.textlength(name, font) + 2.4 * radius
-        width = round(right - 2.4 * radius)
-        return image.crop((0, 0, width, size)).resize((width // 4, size // 4), Image.Resampling.LANCZOS)
+        """Return the legend of the marks in the scene and of the diagram's bars."""
+        tip, polygon, centre = (tuple(round(255 * part) for part in colour) for colour in (TIP, STABLE, CENTRE))
+        marks = ("●", INK), ("▬", self._swing), ("◎", tip), ("■", polygon), ("●", centre)
+        names = "foot stands", "○ foot swings", "planned tip", "support polygon", "centre of mass"
+        font, right = _font(self._pixels(11)), 0.0
+        widths = [font.getlength(f"{mark} {name}  ") for (mark, _), name in zip(marks, names, strict=True)]
+        image = Image.new("RGBA", (round(sum(widths)), self._pixels(STRIP)), (*PAPER, 0))
+        draw, middle = ImageDraw.Draw(image), image.height / 2
+        for (mark, colour), name, width in zip(marks, names, widths, strict=True):
+            draw.text((right, middle), mark, colour, font, "lm")
+            draw.text((right + font.getlength(f"{mark} "), middle), name, INK, font, "lm")
+            right += width
+        return image
 
     def _caption(self, background: np.ndarray, row: int, seconds: float) -> np.ndarray:
         """Return `background` with title and state in the first line, and time, velocities and margin in the second."""

@@ -174,20 +174,21 @@ def convergence_figure(history: "xr.Dataset") -> "Figure":
     for number, stage in enumerate(STAGES):
         part = history.isel(evaluation=history.stage.values == number).sortby("evaluation")
         if part.sizes["evaluation"]:
-            evaluation, labels = (
-                part.evaluation.values + 1,
-                ("candidate", "lowest so far") if not found else (None, None),
-            )
-            axes.plot(evaluation, part.cost, ".", color="0.6", markersize=3.5, label=labels[0])
-            axes.plot(evaluation, part.best, color="0.1", linewidth=1.8, label=labels[1])
+            evaluation, new = part.evaluation.values + 1, not found
+            axes.plot(evaluation, part.cost, ".", color="0.6", markersize=3.5, label="candidate" if new else None)
+            axes.plot(evaluation, part.best, color="0.1", linewidth=1.8, label="lowest so far" if new else None)
             axes.axvline(evaluation[0] - 0.5, color="0.4", linestyle=":", linewidth=1.0)
             axes.text(evaluation[0], 1.0, f" {stage}", va="top", fontsize=10)
             found.append(f"{part.best.values[0]:.2f} to {part.best.values[-1]:.2f} in the {stage}")
     cost = history.cost.attrs["long_name"]
     label = f"{'FLSS' if cost == 'FLSS' else 'cost'} on the starts of the stage"
     axes.set(xlabel="evaluations of the cost function", ylabel=label, ylim=(-0.02, 1.02))
-    named = f"{'FLSS' if cost == 'FLSS' else 'cost'}, lowest so far: {', '.join(found)}"
-    head(figure, named, in_figure(history.attrs["title"]), "" if cost == "FLSS" else f"cost: {cost}")
+    head(
+        figure,
+        f"lowest {label.split()[0]} so far: {', '.join(found)}",
+        in_figure(history.attrs["title"]),
+        "" if cost == "FLSS" else f"cost: {cost}",
+    )
     tidy(axes)
     figure.legend(loc="outside lower center", ncols=2, **LEGEND)
     return figure

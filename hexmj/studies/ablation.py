@@ -36,10 +36,8 @@ MEASURES = {
 }
 """Measure -> event whose frequency it is."""
 
-NOTES = (
-    "without colour: frequency of the complete controller; coloured: change without or with a part, red means more\n"
-    f"* 95 % interval excludes 0; {NOTHING} no walk is left; {FEWER} walks diverged or were out of reach"
-)
+NOTES = f"rows without colour: frequency of the whole; others: change of it; red: more\n* 95 % interval excludes 0; \
+{NOTHING} no walk is left; {FEWER} walks diverged or were out of reach"
 """Explanation of the marks in the cells of the figure."""
 
 
@@ -141,16 +139,15 @@ def ablation_figure(result: "xr.Dataset") -> "Figure":
         data = result.sel(measure=measure).transpose("controller", "velocity", ...)
         texts = [cell_text(data.isel(controller=row, velocity=v)) for row, v in np.ndindex(rows, columns)]
         shown = np.where(wholes[:, None], np.nan, data.more.values)
-        heat_map(
-            panel, result.velocity.values, shown, np.reshape(texts, (rows, columns)), cmap="RdBu_r", vmin=-1.0, vmax=1.0
-        )
+        texts = np.reshape(texts, (rows, columns))
+        heat_map(panel, result.velocity.values, shown, texts, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
         panel.set_title("\n".join(wrap(title, 24)), fontsize=9)
         for row in np.flatnonzero(result.whole.values[1:] != result.whole.values[:-1]):
             panel.axhline(row + 0.5, color="0.3", linewidth=0.8)
     panels[0].set_yticks(range(rows), [in_figure(name) for name in result.controller.values], fontsize=9)
-    falls = result.sel(measure="physical").transpose("controller", "velocity", ...)
-    row, v = np.unravel_index(np.nan_to_num(falls.more.values, nan=-1.0).argmax(), falls.more.shape)
-    change = f"{result.controller.values[row]}, {falls.more.values[row, v]:+.2f} at V = {result.velocity.values[v]:g}"
+    rises = result.more.sel(measure="physical").fillna(-1.0)
+    most = rises.isel(rises.argmax(...))
+    change = f"{most.controller.item()}, {most.item():+.2f} at V = {most.velocity:g}"
     heading = f"largest rise of the frequency of falls: {change}"
     physical, gaits = result.attrs["physical_starts"], min(result.attrs["starts"], MOST_GAIT_STARTS)
     head(figure, heading, f"{caption(result)}; {physical} of them in physics, {gaits} for the gait")

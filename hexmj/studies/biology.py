@@ -283,17 +283,15 @@ def biology_figure(result: "xr.Dataset") -> "Figure":
     axes = figure.subplots(2, 3).ravel()
     for panel, (label, names) in zip(axes[:2], BARS.items(), strict=True):
         _bars(panel, result.value.sel(speed=SPEED).transpose("quantity", "start"), names)
-        panel.set_title(f"{label}", fontsize=9)
+        panel.set_title(label, fontsize=9)
     for panel, (name, label) in zip(axes[2:], OVER_SPEED.items(), strict=True):
         _over_speed(panel, result.value.sel(quantity=name), name)
+        panel.set(xlabel="speed [mm/s]")
         panel.set_title(label, fontsize=9)
-        panel.set_xlabel("speed [mm/s]")
     axes[2].legend(**LEGEND)
-    verdicts = result.verdict.values.tolist()
-    known = sum(verdicts.count(word) for word in ("below", "within", "above"))
-    finding = f"{verdicts.count('within')} of {known} quantities are within the range of real insects"
+    within, known = ((result.verdict.isin(words)).sum().item() for words in (["within"], ["below", "within", "above"]))
     shown = f"means with 95 % intervals; bars at {SPEED:g} mm/s; whole strides: {walked_in_words(result)}"
-    head(figure, finding, caption(result), shown)
+    head(figure, f"{within} of {known} quantities are within the range of real insects", caption(result), shown)
     return figure
 
 

@@ -41,7 +41,7 @@ MOST_IMPULSE = 80.0
 SHIFTS = dict(zip(STYLES, np.linspace(-0.02, 0.02, len(STYLES)), strict=True))
 """Strategy -> shift of its points in V_r / V_p, so that the points of one velocity do not overlap."""
 
-ABOUT = "no strategy", "reorganise: next stable posture", "slow down, then accelerate", "grasp: feet adhere"
+ABOUT = "no strategy", "reorganise: next stable posture", "slow down: for a while", "grasp: feet adhere"
 LABELS = dict(zip(STYLES, ABOUT, strict=True))
 """Strategy -> label of its curve."""
 
@@ -209,7 +209,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
     kinds, measures = list(dict.fromkeys(names[names != NO_DISTURBANCE])), [name for name in ROWS if name in result]
     figure = picture(max(7.0, 1.0 + 2.3 * len(kinds)), 1.3 + 2.2 * len(measures))
     panels = figure.subplots(len(measures), len(kinds), sharex=True, sharey=True, squeeze=False)
-    data = result.sel(observation_time="whole").sortby("velocity")
+    data = result.sel(observation_time="whole").sortby("velocity").transpose("velocity", "case", ...)
     v, empty = data.velocity.values, []
     for (row, column), axes in np.ndenumerate(panels):
         measure, kind = measures[row], kinds[column]
@@ -235,20 +235,11 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
         empty[0].legend(handles=handles, **LEGEND, **note, **place).set_in_layout(False)
     else:
         figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=3)
+    means = {name: data[measures[-1]][:, (strategies == name) & (names != NO_DISTURBANCE)].mean() for name in LABELS}
+    words = ", ".join(f"{LABELS[name].split(':')[0]} {mean:.2f}" for name, mean in means.items() if mean.notnull())
     shown = caption(result, least), strategies_in_words(result), "bars: 95 % intervals"
-    head(figure, _finding(data, measures[-1]), *shown)
+    head(figure, f"mean {ROWS[measures[-1]]}: {words}", *shown)
     return figure
-
-
-def _finding(data: "xr.Dataset", measure: str) -> str:
-    """Return which strategies change a frequency, at some velocity, beyond its 95 % interval."""
-    found = []
-    for word, clear in ("fewer", data[f"{measure}_buys_low"] > 0.0), ("more", data[f"{measure}_buys_high"] < 0.0):
-        for strategy in dict.fromkeys(data.strategy.values[clear.any("velocity").values]):
-            after = data.disturbance.values[clear.any("velocity").values & (data.strategy.values == strategy)]
-            found.append(f"{word} with {strategy.replace('_', ' ')} ({', '.join(after)})")
-    event = "falls" if measure == "physical" else "losses"
-    return f"{event} are {'; '.join(found)}" if found else f"no strategy changes the number of {event} clearly"
 
 
 def _title(disturbance: str) -> str:

@@ -1,7 +1,7 @@
 """Two figures of the league with a row for each entrant: losses and falls; and trials, gaits and costs."""
 
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,17 +29,8 @@ POINTS = {"range": ("o", KINEMATIC, -0.14), "accelerated": ("D", "white", 0.14)}
 """FLSS that is not given per velocity -> marker, its fill, and vertical shift of its point in the entrant's row."""
 
 
-class Panel(NamedTuple):
-    """A heat map with a row for each entrant."""
-
-    title: str
-    values: np.ndarray
-    """(entrant, column) numbers shown as colours."""
-    colours: str
-    """Name of one of matplotlib's colour maps."""
-    fewer: np.ndarray | bool = False
-    """(entrant, column) whether walks are missing; False if none is missing in any cell."""
-    ends: dict[str, Any] = SHARE
+Panel = tuple[str, np.ndarray, str, np.ndarray | bool, dict[str, Any]]
+"""Title of a heat map, its numbers (entrant, column), colour map, whether walks are missing, ends of the colours."""
 
 
 def league_figure(result: "xr.Dataset") -> "Figure":
@@ -47,10 +38,10 @@ def league_figure(result: "xr.Dataset") -> "Figure":
     shown = by_rank(result)
     missing = shown.missing.values > 0
     titles = dict(zip(MEASURES, ("kinematic FLSS", "measured FLSS", "frequency of falls"), strict=True))
-    panels = []
+    panels: list[Panel] = []
     for name, title in titles.items():
         starts, fewer = starts_in_words(shown[f"{name}_starts"].max().item()), name != "kinematic" and missing
-        panels.append(Panel(f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer))
+        panels.append((f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer, SHARE))
     first = shown.entrant.values[shown.best.sel(measure="physical").values == 1]
     finding = f"fewest falls over all velocities: {', '.join(first[:4])}" + " and others" * (len(first) > 4)
     figure, axes, images = _drawn(finding, shown, panels, in_figure(from_one(shown)))
@@ -65,17 +56,17 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
     few, missing = shown.fell_starts.values, shown.missing.values > 0
     some_are = (few > 0) & (few < few.max())
     trials = f"frequency of falls\nin trials, {starts_in_words(few.max())}"
-    panels = [
-        Panel(trials, shown.fell.values, "YlOrRd", some_are),
-        Panel("steady-state gaits:\nshare that is stable", shown.stable.values, "YlGn"),
-        Panel("steady-state gaits: phase\nof legs on one side", shown.ipsilateral.values, "twilight"),
-        Panel("energy cost of transport\nof walks without a fall", shown.cost.values, "PuBu", missing, {}),
+    panels: list[Panel] = [
+        (trials, shown.fell.values, "YlOrRd", some_are, SHARE),
+        ("steady-state gaits:\nshare that is stable", shown.stable.values, "YlGn", False, SHARE),
+        ("steady-state gaits: phase\nof legs on one side", shown.ipsilateral.values, "twilight", False, SHARE),
+        ("energy cost of transport\nof walks without a fall", shown.cost.values, "PuBu", missing, {}),
     ]
     worst = shown.trial.values[np.nan_to_num(shown.fell.mean("entrant").values).argmax()]
     finding = f"the trial with most falls at V = {result.attrs['trial_velocity']:g} is '{worst}'"
     figure, axes, images = _drawn(finding, shown, panels, ABOUT_TRIALS)
-    for ax, image, panel in zip(axes, images, panels, strict=True):
-        ticks = [0.0, 0.5, 1.0] if panel.ends else None
+    for ax, image, (*_, ends) in zip(axes, images, panels, strict=True):
+        ticks = [0.0, 0.5, 1.0] if ends else None
         bar = figure.colorbar(image, ax=ax, location="bottom", ticks=ticks, fraction=0.03, aspect=25)
         bar.ax.tick_params(labelsize=9)
     axes[0].set_xticks(range(shown.sizes["trial"]), shown.trial.values, rotation=90, fontsize=9)
@@ -88,10 +79,10 @@ def _drawn(finding: str, shown: "xr.Dataset", panels: list[Panel], note: str) ->
     rows, images = shown.sizes["entrant"], []
     figure = picture(10.0, 2.6 + 0.18 * rows)
     axes = figure.subplots(1, COLUMNS, sharey=True)
-    for ax, panel in zip(axes, panels, strict=False):
-        marks = np.where(np.isfinite(panel.values), np.where(panel.fewer, FEWER, ""), NOTHING)
-        images.append(heat_map(ax, shown.velocity.values, panel.values, marks, cmap=panel.colours, **panel.ends))
-        ax.set_title(panel.title, fontsize=9)
+    for ax, (title, values, colours, fewer, ends) in zip(axes, panels, strict=False):
+        marks = np.where(np.isfinite(values), np.where(fewer, FEWER, ""), NOTHING)
+        images.append(heat_map(ax, shown.velocity.values, values, marks, cmap=colours, **ends))
+        ax.set_title(title, fontsize=9)
     ranks = [place(shown.isel(entrant=row).sel(measure="physical")) for row in range(rows)]
     names = [f"{in_figure(name)}{rank}" for name, rank in zip(shown.entrant.values, ranks, strict=True)]
     axes[0].set_yticks(range(rows), names, fontsize=9)

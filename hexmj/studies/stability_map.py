@@ -14,7 +14,7 @@ from hexmj.measures.compare import BESIDE, MEASURES
 from hexmj.measures.figures import caption
 from hexmj.measures.study import UNITS, Study, by_halves, kept_walk, standing_starts
 from hexmj.measures.tables import WalkSettings, differences, frequency, happened, over_start, velocity_axis
-from hexmj.plotting import LEGEND, NOTHING, SHARE, head, heat_map, picture
+from hexmj.plotting import LEGEND, NOTHING, head, heat_map, picture
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 from hexmj.studies.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
@@ -226,30 +226,27 @@ def map_figure(result: "xr.Dataset") -> "Figure":
     unknown = np.full((1, columns), np.nan)  # no condition changes kinematic walks
     falls = np.concatenate([result.kinematic.values[:1], result.physical.values])
     words = [[f"{number:.2f}" for number in row] for row in falls]
-    counts = zip(*(table.values.ravel() for table in _saved(result)), strict=True)
-    of_lost = np.reshape([""] * columns + [f"{n}/{all_of}" if all_of else NOTHING for n, all_of in counts], falls.shape)
+    saved = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name").values
+    counts = zip(saved.ravel(), np.isfinite(result.static_loss.values).sum(axis=-1).ravel(), strict=True)
+    of_lost = np.reshape([""] * columns + [f"{n}/{lost}" if lost else NOTHING for n, lost in counts], falls.shape)
     drawn = {
         "frequency of falls": (falls, words, "YlOrRd"),
         "static losses survived / all": (np.concatenate([unknown, result.saved.values]), of_lost, "YlGn"),
     }
+    v, style = result.velocity.values, {"vmin": 0.0, "vmax": 1.0, "origin": "lower"}
     for axes, (title, (numbers, texts, colours)) in zip(panels, drawn.items(), strict=True):
-        heat_map(
-            axes, result.velocity.values, numbers, np.array(texts), cmap=colours, vmin=0.0, vmax=1.0, origin="lower"
-        )
+        heat_map(axes, v, numbers, np.array(texts), cmap=colours, **style)
         axes.axhline(0.5, color="white", linewidth=9.0)
         axes.set_title(title, fontsize=11)
     panels[0].set_yticks(range(rows + 1), ["kinematic FLSS", *(f"{value:g}" for value in result.value.values)])
     panels[0].set_ylabel(_label(result))
-    widest = result.isel(velocity=int(np.ptp(np.nan_to_num(result.physical.values[[0, -1]]), axis=0).argmax()))
-    finding = f"at V = {widest.velocity:g}, the frequency of falls is {_ends(widest.physical)}"
     static = f"static loss: the body's centre of mass leaves the planned polygon; {NOTHING} none"
-    head(figure, finding, _caption(result), static)
+    head(figure, _finding(result), _caption(result), static)
     return figure
 
 
 def mechanisms_figure(result: "xr.Dataset") -> "Figure":
     """Draw the fraction of starts with each mechanism as stacked bars over the condition, a panel for each velocity."""
-    result = result.transpose("value", "velocity", "start", ...)
     columns, values = result.sizes["velocity"], range(result.sizes["value"])
     figure = picture(max(8.0, 3.6 + 1.7 * columns), 4.6)
     panels = figure.subplots(1, columns, sharey=True, squeeze=False)[0]
@@ -264,34 +261,26 @@ def mechanisms_figure(result: "xr.Dataset") -> "Figure":
         panel.set_xticks(values, [f"{value:g}" for value in result.value.values], fontsize=9)
         panel.set(ylim=(0.0, 1.0), xlabel=_label(result).replace(" [", "\n["))
         panel.spines[["top", "right"]].set_visible(False)
-    panels[0].set_ylabel(SHARE)
+    panels[0].set_ylabel("share of the starts")
     handles, _ = panels[0].get_legend_handles_labels()
     figure.legend(handles=handles[::-1], **LEGEND, loc="outside right center")
-    saved, lost = (table.sum("velocity") for table in _saved(result))
-    share = f"the share of static losses that end without a fall is {_ends(saved / lost)}"
-    head(figure, share, _caption(result), "hatched: fell")
+    head(figure, _finding(result), _caption(result), "hatched: fell")
     return figure
 
 
-def _saved(result: "xr.Dataset") -> tuple["xr.DataArray", "xr.DataArray"]:
-    """Return the numbers of starts that survive a static loss and of all with a static loss, (value, velocity)."""
-    saved = result["count"].sel(mechanism_name=list(SAVED)).sum("mechanism_name")
-    return saved, saved.copy(data=np.isfinite(result.static_loss.values).sum(axis=-1))
-
-
-def _ends(numbers: "xr.DataArray") -> str:
-    """Return the first and the last of the numbers over the condition, as a text."""
-    name, _, unit = _label(numbers).removeprefix("swing velocity ").removesuffix("]").partition(" [")
-    values = numbers.value.values
-    return " and ".join(f"{numbers.values[i]:.2f} at {name} = {values[i]:g} {unit}".strip() for i in (0, -1))
+def _finding(result: "xr.Dataset") -> str:
+    """Return the falls at the first and the last value of the condition, at the velocity where they differ most."""
+    falls, values = result.physical.transpose("value", "velocity").values, result.value.values
+    name, _, unit = _label(result).removeprefix("swing velocity ").removesuffix("]").partition(" [")
+    v = np.abs(np.nan_to_num(falls[-1] - falls[0])).argmax()
+    ends = " and ".join(f"{falls[i, v]:.2f} at {name} = {values[i]:g} {unit}".strip() for i in (0, -1))
+    return f"at V = {result.velocity.values[v]:g}, the frequency of falls is {ends}"
 
 
 def _caption(result: "xr.Dataset") -> str:
-    number = result.sizes["start"]
-    left = "" if number == result.attrs["starts"] else f"; {number} of them stand and reach nine of ten tips everywhere"
-    return caption(result) + left
+    return f"{caption(result)}; {result.sizes['start']} of them stand and reach nine of ten tips at every value"
 
 
-def _label(result: "xr.Dataset | xr.DataArray") -> str:
+def _label(result: "xr.Dataset") -> str:
     name, unit = result.value.attrs["long_name"], result.value.attrs["units"]
     return name.replace("V_p", "$V_p$") + (f" [{unit}]" if unit != "1" else "")

@@ -21,7 +21,7 @@ from hexmj.measures.compare import with_flss
 from hexmj.measures.figures import caption
 from hexmj.measures.study import Study, kept_walk
 from hexmj.measures.tables import WalkSettings, over_start
-from hexmj.plotting import LEGEND, MEASURE_STYLES, SHARE, frequency_curve, head, picture, tidy
+from hexmj.plotting import LEGEND, MEASURE_STYLES, frequency_curve, head, picture, tidy
 from hexmj.stability import loss_time, stability_margin, walk_margin
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration
@@ -70,7 +70,7 @@ STYLES: dict[str, dict[str, Any]] = MEASURE_STYLES | {
 """Curve -> its style."""
 
 PANELS = {
-    SHARE: {"measured": "measured", "grounded": "grounded", "physical": "physical"},
+    "share of the starts": {"measured": "measured", "grounded": "grounded", "physical": "physical"},
     "agreement with kinematic losses": {
         "agreement_measured": "measured",
         "agreement_grounded": "grounded",
@@ -233,7 +233,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
         for (curve, mass), shift in zip(product(curves.items(), range(len(masses))), shifts, strict=True):
             (name, look), data = curve, result.isel(leg_mass=mass)
             style = STYLES[look] | {"linestyle": LINES[mass % len(LINES)]}
-            if title == SHARE:
+            if title == "share of the starts":
                 frequency_curve(axes, vps * shift, data, name, **style)
             else:
                 values = data[name] if "start" not in data[name].dims else data[name].mean("start")

@@ -180,9 +180,9 @@ def terrain_figure(result: "xr.Dataset") -> "Figure":
         tidy(axes)
     handles, _ = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=len(handles))
-    falls = result.flss.mean(["grasp", "velocity"]).values
-    ends = zip(("fewest", "most"), (int(np.nanargmin(falls)), int(np.nanargmax(falls))), strict=True)
-    finding = "; ".join(f"{word} falls: {result.obstacle.values[n]} ({falls[n]:.2f})" for word, n in ends)
+    falls = result.flss.mean(["grasp", "velocity"]).dropna("obstacle")
+    ends = {"fewest": falls.values.argmin(), "most": falls.values.argmax()}
+    finding = "; ".join(f"{word} falls: {falls.obstacle.values[n]} ({falls.values[n]:.2f})" for word, n in ends.items())
     shown = "falls after the obstacle is reached, mean over the curves; size 0: flat ground; bars: 95 % intervals"
     head(figure, finding, caption(result, int(result.reached.min())), shown)
     return figure
