@@ -1,6 +1,7 @@
 """Progress bars of long work, on standard error."""
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -26,7 +27,10 @@ def shown(progress: Progress | bool | None, label: str) -> Iterator[Progress | N
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Progress]:
-    """Show a progress bar during a block, and provide its progress function, which any thread may call."""
+    """Show a progress bar during a block, and provide its progress function, which any thread may call.
+
+    The clock of the estimate starts with the first progress, so that it leaves out the compilation.
+    """
     from tqdm import tqdm
 
     screen = sys.stderr.isatty()
@@ -36,7 +40,8 @@ def progress_bar(label: str) -> Iterator[Progress]:
 
         def advance(done: float) -> None:
             with bar.get_lock():
-                bar.desc = label
+                if not bar.initial:
+                    bar.desc, bar.initial, bar.start_t, bar.delay = label, done, time.time(), 0.0
                 bar.update(done)
 
         yield advance

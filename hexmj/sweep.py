@@ -12,7 +12,7 @@ import re
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, partial
@@ -20,6 +20,7 @@ from importlib.metadata import version
 from inspect import getsource, signature
 from multiprocessing import get_context, parent_process
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
 
 import numpy as np
@@ -99,7 +100,8 @@ class Execution(TypedDict, total=False):
     """Executor that computes the cells in threads, in processes or on other machines that share the folder; by default,
     this process computes the cells one after another."""
     progress: Progress | bool | None
-    """True shows a progress bar; a function is called with the fraction of the work done since its last call."""
+    """True shows a progress bar; a function is called with the fraction of the work done since its last call. Cached
+    cells are no work."""
     threads: int | None
     """Number of threads of each cell; by default one per core, or one if there is an executor."""
     fresh: bool
@@ -134,8 +136,8 @@ def finished_cells(
         InputError: a setting cannot be part of a cache key, or a worker process died. An error of a cell is raised with
             a note that names the cell.
     """
-    executor, progress = execution.get("executor"), execution.get("progress")
-    threads, total, done = execution.get("threads"), sum(cell.work for cell in cells), [0.0] * len(cells)
+    executor, progress, threads = (execution.get(name) for name in ("executor", "progress", "threads"))
+    done = [0.0] * len(cells)
     paths: list[Path | None] = [None] * len(cells)
     if folder is not None:
         Path(folder).mkdir(parents=True, exist_ok=True)
@@ -144,19 +146,26 @@ def finished_cells(
             for path in filter(None, paths):
                 path.unlink(missing_ok=True)
 
+    left = {i: cells[i] for i, path in enumerate(paths) if not (path and path.exists())}
+    total = sum(cell.work for cell in left.values())
+
     def advance(i: int, fraction: float) -> None:
+        fraction = min(fraction, 1.0 - done[i])
         done[i] += fraction
         if callable(progress):
             progress(fraction * cells[i].work / total)
 
+    yield from ((i, _cached(path)) for i, path in enumerate(paths) if path and i not in left)
     if executor is None:
-        each = ((i, {"threads": threads, "progress": partial(advance, i)}) for i in range(len(cells)))
+        each = ((i, {"threads": threads, "progress": partial(advance, i)}) for i in left)
         computed = ((i, _computed(cells[i], paths[i], **arguments)) for i, arguments in each)
     else:
-        computed = _on_executor(executor, cells, paths, threads or 1)
+        computed = _on_executor(executor, left, paths, threads or 1, lambda i, fraction: advance(i, fraction - done[i]))
     for i, data in computed:
-        advance(i, 1.0 - done[i])
+        advance(i, 1.0)
         yield i, data
+    if not left and callable(progress):
+        progress(1.0)
 
 
 def _computed(cell: Cell, path: Path | None, **execution: Any) -> "xr.Dataset":
@@ -181,21 +190,41 @@ def _cached(path: Path) -> "xr.Dataset":
 
 
 def _on_executor(
-    executor: Executor, cells: Sequence[Cell], paths: Sequence[Path | None], threads: int
+    executor: Executor,
+    cells: Mapping[int, Cell],
+    paths: Sequence[Path | None],
+    threads: int,
+    reached: Callable[[int, float], None],
 ) -> Iterator[tuple[int, "xr.Dataset"]]:
-    futures = {
-        executor.submit(_computed, *task, threads=threads): i for i, task in enumerate(zip(cells, paths, strict=True))
-    }
-    try:
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    except BrokenExecutor:
-        raise InputError(
-            "A worker process died. Finished cells are cached. Run again, with fewer processes if memory ran out."
-        ) from None
-    finally:
-        for future in futures:
-            future.cancel()
+    """Yield cells as they finish; call `reached` with the fraction of a cell that a worker on this machine has done."""
+    with TemporaryDirectory() as folder:
+        reports = np.memmap(Path(folder, "done"), float, "w+", shape=len(paths))
+        report = partial(_report, str(reports.filename))
+        futures = {
+            executor.submit(_computed, cell, paths[i], threads=threads, progress=partial(report, i)): i
+            for i, cell in cells.items()
+        }
+        running = set(futures)
+        try:
+            while running:
+                finished, running = wait(running, 0.5, FIRST_COMPLETED)
+                for i in map(futures.__getitem__, running):
+                    reached(i, float(reports[i]))
+                for future in finished:
+                    yield futures[future], future.result()
+        except BrokenExecutor:
+            raise InputError(
+                "A worker process died. Finished cells are cached. Run again, with fewer processes if memory ran out."
+            ) from None
+        finally:
+            for future in futures:
+                future.cancel()
+
+
+def _report(file: str, i: int, fraction: float) -> None:
+    """Add what a worker has done of cell i to the file of the reports, which other machines do not have."""
+    with suppress(OSError):
+        np.memmap(file, float, "r+")[i] += fraction
 
 
 def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: Any) -> "xr.Dataset":
@@ -258,6 +287,11 @@ class CachedValues:
                     file.writelines(f"\n{k.hex()} {v.hex()}\n" for k, v in zip(new, values, strict=True))
             self._values |= zip(new, values, strict=True)
         return np.array([self._values[key] for key in keys])
+
+    @property
+    def known(self) -> int:
+        """Number of distinct rows whose values are known."""
+        return len(self._values)
 
     @property
     def replayed(self) -> int:

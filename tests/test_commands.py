@@ -19,7 +19,7 @@ from film_reader import read_film
 from hexmj.cli.command import StudyCommand, imported
 from hexmj.cli.main import COMMANDS, command
 from hexmj.cli.options import NAMES
-from hexmj.cli.output import difference, four_digits, interval, tables_that_fit
+from hexmj.cli.output import difference, four_digits, interval, table
 from hexmj.controllers.cruse1998 import network_toml
 
 STUDIES = [name for name in COMMANDS if isinstance(command(name), StudyCommand)]
@@ -332,5 +332,5 @@ def test_numbers_have_four_digits_or_are_whole(number: float, shown: str) -> Non
 
 def test_wide_tables_are_divided_and_no_cell_is_broken(monkeypatch) -> None:
     monkeypatch.setenv("COLUMNS", "40")
-    parts = [*tables_that_fit(["name", *"abcdef"], [["ldvs", *6 * ["0.123 (.01-.23)"]]])]
+    parts = [*table(["name", *"abcdef"], [["ldvs", *6 * ["0.123 (.01-.23)"]]])]
     assert [len(part.columns) for part in parts] == [3, 3, 3]

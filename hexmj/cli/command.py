@@ -35,6 +35,8 @@ class Answer:
     """File name of the manifest in the folder of --out."""
     result: "xr.Dataset | None" = None
     """Result of a study. The manifest records its settings, and the terminal shows its `settings_line`."""
+    closing: Sequence[str] = ()
+    """Lines after the names of the files."""
 
 
 class Command:
@@ -95,7 +97,8 @@ class Command:
             head = {} if result is None else {"settings": recorded, "searched": searched(given)}
             print(json_text(head | dict(answer.json) | {"files": files}))
         else:
-            show(*answer.lines, *([] if result is None else [settings_line(given, result)]), *map(str, files))
+            line = [] if result is None else [settings_line(given, result)]
+            show(*answer.lines, *line, *map(str, files), *answer.closing)
 
 
 class StudyCommand(Command):
@@ -152,7 +155,8 @@ class StudyCommand(Command):
                 files.append(draw(result, folder / f"{name.format(**vars(given))}.{given.format}", which))
             files += self.write_more(given, result)
         manifest = self.manifest.format(**vars(given))
-        return Answer(self.summary(result), self.shown(study, result), files, manifest=manifest, result=result)
+        closing = [] if folder else ["Nothing is saved; --out FOLDER saves the table, a figure and a manifest."]
+        return Answer(self.summary(result), self.shown(study, result), files, None, manifest, result, closing)
 
 
 def imported(place: str) -> Any:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hexmj.cli.command import Answer, Command, StudyCommand, filmed
 from hexmj.cli.measures import PHYSICAL
 from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules, no_effect, option_fields
-from hexmj.cli.output import interval, report_checks, table, tables_that_fit
+from hexmj.cli.output import interval, report_checks, table
 from hexmj.errors import InputError
 from hexmj.timing import Stride
 from hexmj.validate import distinct
@@ -68,7 +68,7 @@ class League(StudyCommand):
 
         for ranking in tables(result):
             yield ranking.title
-            yield from tables_that_fit(ranking.head, ranking.rows)
+            yield table(ranking.head, ranking.rows)
 
     def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
         """Write the tables as Markdown, and a film of the best controllers, which walk in physics from start 0."""
@@ -128,7 +128,7 @@ class Ablate(StudyCommand):
                 (name, *(_ablated(data.sel(controller=name, velocity=v)) for v in velocities))
                 for name in result.controller.values
             ]
-            yield from tables_that_fit(("controller", *(f"V = {v:g}" for v in velocities)), rows)
+            yield table(("controller", *(f"V = {v:g}" for v in velocities)), rows)
 
 
 def _ablated(data: "xr.Dataset") -> str:

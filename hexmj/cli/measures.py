@@ -25,6 +25,18 @@ PHYSICAL = tuple(member.name for member in fields(Conditions) if member.name != 
 FOOT_PATH = ("vp", "step_height", "standing_height", "lift_time", "landing_time")
 """Options of `PHYSICAL` that also change the recording of a kinematic walk."""
 
+EXPLAINED = """\
+t: observation time [time units]
+kinematic: the centre of mass leaves the support polygon of the planned feet
+measured: it leaves the polygon of the feet that carry load in the simulation
+physical: falls, that is, the trunk touches the ground
+
+Starts on which kinematic and physical measure agree (agree), with a kinematic
+loss and a fall (both), only a loss (kin.), only a fall (phys.) or neither (none)"""
+"""Lines that explain the tables of `hexmj compare`."""
+
+TOPPLED = "toppled: the trunk tilts by more than 0.1 rad"
+
 TIMES = ("planned loss", "measured loss", "fall")
 """Entries of a walk's summary that are times [time units]; infinity says that the event does not happen."""
 
@@ -60,7 +72,9 @@ class Walk(Command):
         summary = recording_summary(walked)
         lines = [f"{key}: {_in_words(key, value)}" for key, value in summary.items() if value is not None]
         result = walked.drop_vars(walked.variables).assign_attrs(attributes(settings))
-        return Answer(summary | {"settings": settings}, [title, *lines], files, result=result)
+        closing = [f"Next: hexmj {command} {files[0]}" for command in ("render", "page", "view")]
+        closing += [] if given.physical else ["Or simulate this walk: add --physical"]
+        return Answer(summary | {"settings": settings}, [title, *lines], files, result=result, closing=closing)
 
 
 @dataclass(frozen=True)
@@ -119,7 +133,10 @@ class Flss(StudyCommand):
         physical = "fall" in result
         yield f"{'physical' if physical else 'kinematic'} FLSS of {result.attrs['model']}"
         yield grid(result, ("velocity",), columns)
+        spread = "; sample sd: standard deviation over samples of 1000 starts" if "sample_sd" in columns else ""
+        yield f"low, high: 95 % interval; duration: observation time [time units]{spread}"
         if physical:
+            yield TOPPLED
             yield report_line(physical_report(result))
 
 
@@ -178,18 +195,17 @@ class Compare(StudyCommand):
         return summary | {"report": physical_report(result), "settings": settings(result) | durations}
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, physical_report
+        from hexmj.measures.compare import AGREEMENT, MEASURES, physical_report
 
         axes, names = ("controller", "velocity"), ("both", "kin.", "phys.", "none")
         columns: dict[str, Column] = {"t": lambda data: four_digits(data.duration.item())}
-        answers = {"agree": "agreement", **dict(zip(names, AGREEMENT, strict=True)), **{name: name for name in BESIDE}}
-        yield "Frequency of the loss of static stability, with 95 % intervals; physical: falls"
+        answers: dict[str, Column] = {"agree": "agreement", **dict(zip(names, AGREEMENT, strict=True))}
+        answers |= {"toppled": lambda data: str(np.isfinite(data.topple).sum().item()), "speed": _speeds}
+        yield "FLSS, frequency of the loss of static stability, with 95 % intervals"
         yield grid(result, axes, columns | {name: name for name in MEASURES})
-        yield (
-            "Numbers of starts that lost the planned stability and fell (both), only lost it (kin.), only fell (phys.)"
-            " or neither (none); speed / commanded speed, minimum-maximum over the starts that did not fall"
-        )
-        yield grid(result, axes, answers | {"speed": _speeds})
+        yield EXPLAINED
+        yield grid(result, axes, answers)
+        yield TOPPLED
         yield report_line(physical_report(result))
 
 

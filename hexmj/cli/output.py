@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 Column = str | Callable[["xr.Dataset"], str]
 """Column of a table: name of a variable, or a function from the data of a row to the text of its cell."""
 
-HEADS = {"velocity": "V", "vp": "V_p", "leg_mass": "legs", "mechanism_name": "starts that"}
-"""Axis of a result -> its heading in tables, where it is not the axis's name."""
+HEADS = {"velocity": "V", "vp": "V_p", "leg_mass": "mass", "flss": "FLSS"}
+"""Axis or variable of a result -> its heading in tables, where it is not its name."""
 
 GAP = 2
 """Number of characters between two columns of a table."""
@@ -27,41 +27,42 @@ def show(*parts: Any) -> None:
 
     console = Console(highlight=False, soft_wrap=False, markup=False, emoji=False)
     for part in parts:
-        console.print(part if isinstance(part, str) else Padding(part, (1, 0), expand=False))
+        for one in [part] if isinstance(part, str) else part:
+            console.print(one if isinstance(one, str) else Padding(one, (1, 0), expand=False))
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> "Table":
-    """Return a table of texts; if it is wider than the screen, long cells continue on further lines."""
+def table(head: Iterable[str], rows: Iterable[Iterable[str]], repeated: int | None = 1) -> "Iterator[Table]":
+    """Yield a table of texts, split by columns into parts that fit the width of the screen.
+
+    Args:
+        head: heading of each column.
+        rows: texts of each row.
+        repeated: number of columns at the left that every part repeats; with None, long cells continue on further lines
+            instead.
+    """
     from rich import box
+    from rich.console import Console
     from rich.table import Table
 
-    screen = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
-    for column in head:
-        screen.add_column(column.replace("_", " "), overflow="fold")
-    for row in rows:
-        screen.add_row(*row)
-    return screen
-
-
-def tables_that_fit(head: Sequence[str], rows: Sequence[Sequence[str]]) -> "Iterator[Table]":
-    """Split a table by columns into parts that fit the width of the screen; each part repeats the first column."""
-    from rich.console import Console
-
-    width = Console().width
-    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-    parts, used = [[0]], widths[0]
-    for column, own in enumerate(widths[1:], 1):
-        if used + GAP + own > width and len(parts[-1]) > 1:
-            parts.append([0])
-            used = widths[0]
+    columns = [*zip([HEADS.get(name, name.replace("_", " ")) for name in head], *rows, strict=True)]
+    width, widths = Console().width, [max(map(len, column)) for column in columns]
+    parts = [columns[:repeated]]
+    for column, own in zip(columns[repeated:], widths[repeated:], strict=True) if repeated else ():
+        used = sum(max(map(len, column)) + GAP for column in parts[-1])
+        if used + own > width and len(parts[-1]) > (repeated or 0):
+            parts.append(columns[:repeated])
         parts[-1].append(column)
-        used += GAP + own
     for part in parts:
-        yield table([head[column] for column in part], [[row[column] for column in part] for row in rows])
+        screen = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
+        for name, *_ in part:
+            screen.add_column(name, overflow="fold")
+        for row in zip(*(texts for _, *texts in part), strict=True):
+            screen.add_row(*row)
+        yield screen
 
 
-def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column] | Iterable[str]) -> "Table":
-    """Return a table with one row for each combination of labels along some axes.
+def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column] | Iterable[str]) -> "Iterator[Table]":
+    """Yield a table, or parts that fit the screen, with one row for each combination of labels along some axes.
 
     Args:
         result: the data.
@@ -74,7 +75,7 @@ def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column
         data = result.sel(dict(zip(axes, labels, strict=True)))
         names = (f"{label:g}" if isinstance(label, float) else label.replace("_", " ") for label in labels)
         rows.append((*names, *(_text(data, column) for column in columns.values())))
-    return table((*(HEADS.get(axis, axis) for axis in axes), *columns), rows)
+    return table((*axes, *columns), rows, len(axes))
 
 
 def over_velocity(result: "xr.Dataset", text: Callable[["xr.Dataset"], str]) -> dict[str, Column]:
@@ -97,7 +98,8 @@ def _text(data: "xr.Dataset", column: Column) -> str:
 def interval(data: "xr.Dataset", measure: str) -> str:
     """Return a frequency with its interval, such as 0.520 (.39-.64)."""
     middle, low, high = (data[measure + end].item() for end in ("", "_low", "_high"))
-    return "-" if middle != middle else f"{middle:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-")
+    text = f"{middle:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-").replace("-1.00", "-1.0")
+    return "-" if middle != middle else text
 
 
 def difference(data: "xr.Dataset", measure: str) -> str:

@@ -1,7 +1,7 @@
 """`hexmj map`, `hexmj disturb`, `hexmj terrain`, `hexmj converge` and `hexmj biology`."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -57,20 +57,19 @@ class Map(StudyCommand):
 
         saved: dict[str, Column] = {"static": lambda data: f"{data.static.item():.3f}", "saved": _saved}
         changes = {name: partial(difference, measure=name) for name in ("dynamics", "change")}
-        counts = {f"{value:g}": _count(value) for value in result.value.values}
-        yield f"{study.controller.name} over {study.over}: FLSS, with 95 % intervals; physical: falls"
+        axes, over, at = (study.over, "velocity"), study.over.replace("_", " "), result.rename(value=study.over)
+        yield f"{study.controller.name} over {over}: FLSS, with 95 % intervals"
+        yield "physical: falls; Froude: the number (V V_p)^2 / (g h)"
         froude = {"Froude": lambda data: f"{data.froude.item():.2g}"}
-        yield grid(result, ("value", "velocity"), froude | {name: name for name in MEASURES})
+        yield grid(at, axes, froude | {name: name for name in MEASURES})
         yield (
-            "Saved: fraction of the starts with a static loss that do not fall; dynamics: physical minus static FLSS;"
-            f" change: physical FLSS minus physical FLSS at {study.over} = {result.attrs['reference']:g}"
+            "static: FLSS of the plan with the body's own centre of mass; saved: fraction of these losses without a"
+            f" fall; dynamics: physical minus static; change: physical FLSS minus that at {over} ="
+            f" {result.attrs['reference']:g}"
         )
-        yield grid(result, ("value", "velocity"), saved | changes)
-        yield f"Mechanisms: numbers of starts at each {study.over}"
-        yield grid(result, ("velocity", "mechanism_name"), counts)
-        toppled = (result.topple < float("inf")).sum("start").to_dataset(name="count")
-        yield "Starts that toppled"
-        yield grid(toppled, ("velocity",), counts)
+        yield grid(at, axes, saved | changes)
+        yield f"Number of starts at each {over} by what happens to them (hexmj.studies.mechanisms defines the names)"
+        yield table(("velocity", "starts", *(f"{value:g}" for value in result.value.values)), _mechanisms(result), 2)
         stand = (f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True))
         yield (
             f"{result.sizes['start']} of {study.n_starts} starts are counted: they stand on six feet and reach at least"
@@ -82,8 +81,13 @@ def _saved(data: "xr.Dataset") -> str:
     return interval(data, "saved") if data.static.item() else "none lost"
 
 
-def _count(value: float) -> Column:
-    return lambda data: str(data["count"].sel(value=value).item())
+def _mechanisms(result: "xr.Dataset") -> Iterator[list[str]]:
+    """Yield velocity, mechanism and counts at each value; a mechanism without starts at the velocity is left out."""
+    for v in result.velocity.values:
+        data = result.sel(velocity=v)
+        counts = {name: data["count"].sel(mechanism_name=name).values for name in result.mechanism_name.values}
+        counts["toppled"] = (data.topple < float("inf")).sum("start").values
+        yield from ([f"{v:g}", name.replace("_", " "), *map(str, n)] for name, n in counts.items() if n.any())
 
 
 class Disturb(StudyCommand):
@@ -109,7 +113,7 @@ class Disturb(StudyCommand):
             yield words
 
 
-def _disturbed(result: "xr.Dataset", measure: str) -> "Iterable[str | Table]":
+def _disturbed(result: "xr.Dataset", measure: str) -> "Iterable[str | Iterator[Table]]":
     """Yield headings and tables for one measure of FLSS: its values, and how much the strategies reduce it."""
     strategy, kinds = result.strategy.values, [name.partition(" ")[0] for name in result.disturbance.values]
     kinematic = [kind != "push" and answer != "grasp" for kind, answer in zip(kinds, strategy, strict=True)]
@@ -130,12 +134,12 @@ def _disturbed(result: "xr.Dataset", measure: str) -> "Iterable[str | Table]":
         yield _cases(whole.isel(case=answered), f"{measure}_buys", difference)
 
 
-def _cases(result: "xr.Dataset", name: str, text: "Callable[[xr.Dataset, str], str]") -> "Table":
-    """Return a table with a row for each disturbance and strategy (case), and a column for each velocity."""
+def _cases(result: "xr.Dataset", name: str, text: "Callable[[xr.Dataset, str], str]") -> "Iterator[Table]":
+    """Yield a table with a row for each disturbance and strategy (case), and a column for each velocity."""
     columns = {"disturbance": lambda data: data.disturbance.item(), "strategy": _strategy}
     columns |= over_velocity(result, lambda data: text(data, name))
     rows = [[column(result.isel(case=case)) for column in columns.values()] for case in range(result.sizes["case"])]
-    return table(columns, rows)
+    return table(columns, rows, 2)
 
 
 def _strategy(data: "xr.Dataset") -> str:
@@ -155,15 +159,14 @@ class Terrain(StudyCommand):
         return lists_of(result[["flss", "flss_low", "flss_high", "reached", "crossed"]])
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        def fell_on(data: "xr.Dataset") -> str:
-            parts = data.fall_part.values[data.after.values].astype(int)
-            counts = Counter(study.conditions.body.trunk[part] for part in parts)
-            return ", ".join(f"{part} {number}" for part, number in counts.most_common())
-
+        parts = result.fall_part.values[result.after.values].astype(int)
+        fell_on = Counter(study.conditions.body.trunk[part] for part in parts).most_common()
         columns = over_velocity(result, partial(interval, measure="flss"))
         columns["crossed"] = lambda data: f"{data.crossed.sum().item()} of {data.reached.sum().item()}"
         yield "FLSS after the obstacle has been reached, with 95 % intervals; earlier falls do not count"
-        yield grid(result, ("obstacle", "grasp"), columns | {"fell on": fell_on})
+        yield grid(result, ("obstacle", "grasp"), columns)
+        yield "grasp: adhesion over the weight; crossed: starts that crossed the obstacle, of those that reached it"
+        yield f"parts that touched the ground: {', '.join(f'{part} {n}' for part, n in fell_on) or 'none'}"
         yield f"commanded distance {result.attrs['distance']:g} mm"
 
 
@@ -183,7 +186,10 @@ class Converge(StudyCommand):
         from hexmj.studies.static_limit import LOSSES
 
         means, axes = _means(result), ("leg_mass", "vp")
-        yield f"V = {study.velocity:g}: FLSS, with 95 % intervals; physical: falls"
+        yield (
+            f"V = {study.velocity:g}: FLSS, with 95 % intervals; mass: of the legs, in multiples of the default;"
+            " grounded: measured with all feet near the ground; physical: falls"
+        )
         yield grid(means, axes, [*LOSSES])
         yield "Fraction of starts with the same outcome as in the plan; fraction of steps with the planned stance"
         yield grid(means, axes, AGREEMENT)
@@ -218,7 +224,7 @@ class Biology(StudyCommand):
         from hexmj.studies.biology import HEADS, table_rows, walked_in_words
 
         yield f"{study.controller.name} and real insects, at 24 mm/s unless a row names another speed"
-        yield table(HEADS, table_rows(result))
+        yield table(HEADS, table_rows(result), None)
         yield f"Starts with complete strides: {walked_in_words(result)}. biology.md names the sources."
 
     def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:

@@ -50,11 +50,12 @@ class Comparison(Study):
     def cells(self) -> list[Cell]:
         """Return a cell for each controller and velocity, computed by `outcome_table`."""
         self.check_walks(self.velocities)
-        return [
-            Cell(f"{name}-V-{v:g}", outcome_table, {"walks": self.walks(v, t, self.conditions, controller)}, work=t)
-            for name, controller in self.controllers.items()
-            for v, t in zip(*self.observed, strict=True)
-        ]
+        cells = []
+        for name, controller in self.controllers.items():
+            for v, t in zip(*self.observed, strict=True):
+                own = {"walks": self.walks(v, t, self.conditions, controller)}
+                cells.append(Cell(f"{name}-V-{v:g}", outcome_table, own, tables.expected_work(v, t)))
+        return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the dataset that `compare` describes, from the datasets of all cells."""

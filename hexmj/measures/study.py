@@ -163,12 +163,12 @@ def by_halves(
             yield from by_halves(half, walk, diverging)
 
 
-def kept_walk(walks: WalkSettings, starts: np.ndarray, threads: int | None) -> "PhysicalWalk":
-    """Return every step of the physical walks from `starts`, tips at time 0, (start, leg) [mm]."""
+def kept_walk(walks: WalkSettings, starts: np.ndarray, **execution: Any) -> "PhysicalWalk":
+    """Return every step of the physical walks from `starts`, (start, leg) [mm]; `execution`: threads and progress."""
     from hexmj.measures.physical import physical_walk
 
     how: Any = {"conditions": walks.conditions, "stride": walks.stride, "acceleration": walks.acceleration}
-    return physical_walk(starts, walks.controller, walks.velocity, walks.duration, **how, threads=threads)
+    return physical_walk(starts, walks.controller, walks.velocity, walks.duration, **how, **execution)
 
 
 def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":

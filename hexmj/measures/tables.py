@@ -77,6 +77,11 @@ def observed(
     return v, duration
 
 
+def expected_work(velocity: float, duration: float) -> float:
+    """Return the relative computing time of a walk: losses and falls end more of the fast walks."""
+    return duration * (1.0 - velocity)
+
+
 def velocity_axis(v: np.ndarray, duration: np.ndarray) -> dict[str, Any]:
     """Return the coordinates `velocity` and `duration` for velocities and their observation times, both (velocity,)."""
     return {

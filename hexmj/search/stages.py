@@ -140,22 +140,26 @@ def search(
     domain = problem.domain(effort.domain, effort.beginning)
     budgets = dict(zip(STAGES, (effort.budget, effort.refine_budget), strict=True))
     sizes = dict(zip(STAGES, (effort.starts or 0, effort.refine_starts or 0), strict=True))
-    work = sum(budgets[stage] * sizes[stage] for stage in STAGES)
     samples = {stage: Sample(problem, sizes[stage], effort.seed) for stage in STAGES if budgets[stage]}
     how: Any = {"threads": threads, "fresh": fresh}
     cached = {stage: CachedValues(Cell(stage, sample.costs, {}), folder, **how) for stage, sample in samples.items()}
-    evaluated: list[Evaluated] = []
+    work = {stage: max(1, budgets[stage] - values.known) * sizes[stage] for stage, values in cached.items()}
+    done, evaluated = 0.0, list[Evaluated]()
     with shown(progress, "searching") as advance:
         for sample in samples.values():
             sample.settle(threads)
 
         def costs(stage: str, candidates: np.ndarray) -> np.ndarray:
+            nonlocal done
             result = np.empty(len(candidates))
             size = 1 if problem.conditions else len(candidates)  # physical walks are slow: cache each cost at once
             for i in range(0, len(candidates), size):
+                known = cached[stage].known
                 result[i : i + size] = cached[stage](candidates[i : i + size])
-                if advance:
-                    advance(size * sizes[stage] / work)
+                new = (cached[stage].known - known) * sizes[stage] / sum(work.values())
+                done += new
+                if advance and new:
+                    advance(new)
             evaluated.append((stage, candidates.copy(), result))
             return result
 
@@ -164,6 +168,8 @@ def search(
         best, cost = search_population(searcher, partial(costs, "population"), effort.budget)
         if effort.refine_budget:
             best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget, domain.unit)
+        if advance:
+            advance(1.0 - done)
     course = history(evaluated, problem.form.names, problem.minimised)
     refused = list(filter(None, map(problem.refusal, course.candidate.values)))
     if reason := problem.refusal(best):

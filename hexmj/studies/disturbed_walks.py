@@ -16,6 +16,7 @@ from hexmj.controllers.protocol import Controller, SteerableController, check_st
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.tables import over_start
+from hexmj.progress import Progress
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_plans import Disturbance, Disturbed, Kind, Postures, collect_postures
 from hexmj.timing import Acceleration, Stride, steps_within
@@ -185,6 +186,7 @@ class StableWalks:
         conditions: Conditions | None,
         threads: int | None = None,
         which: np.ndarray | None = None,
+        progress: Progress | None = None,
     ) -> "xr.Dataset":
         """Return the `TIMES` of every start in one case, and the number `drawn` of random starts.
 
@@ -195,6 +197,7 @@ class StableWalks:
             conditions: conditions of physical walks; None computes kinematic walks.
             threads: number of threads, by default one per core.
             which: indices of the starts that walk, (n,), by default all; the walks last as long as those of all starts.
+            progress: called with the fraction done since the last call.
 
         Raises:
             TooFewStable: too few starts are stable until the disturbance.
@@ -224,7 +227,8 @@ class StableWalks:
             settled = settle(starts, conditions, self.stride, threads)
             walks = SensoryFeedback(disturbed) if isinstance(self.controller, SensoryFeedback) else disturbed
             plan = begin(walks, starts, self.velocity, self.stride, recovery, threads=1)
-            times["fall"] = outcomes_of_plan(settled, plan, end, lost, push=push, threads=threads).fall
+            how: Any = {"push": push, "threads": threads, "progress": progress}
+            times["fall"] = outcomes_of_plan(settled, plan, end, lost, **how).fall
         table = over_start(times, dict.fromkeys(TIMES, "time unit"))
         for name, values in table.items():
             values.attrs["long_name"] = TIMES[str(name)]

@@ -11,6 +11,7 @@ from hexmj.controllers.planning import begin
 from hexmj.legs import SIDE
 from hexmj.measures.tables import WalkSettings
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, PAIRS, circular_mean
+from hexmj.progress import Progress
 from hexmj.rotations import heading, rotated, turned
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ class Strides:
 
 
 def last_strides(
-    settled: "Settled", walks: WalkSettings, measured: float, threads: int | None = None
+    settled: "Settled", walks: WalkSettings, measured: float, **execution: Any
 ) -> Iterator[tuple[int, Strides]]:
     """Walk, and yield the index of each start that does not fall with its whole strides at the end of the walk.
 
@@ -129,13 +130,13 @@ def last_strides(
         settled: starts at rest, with sensors of the feet's forces.
         walks: settings of the walks.
         measured: duration of the end of the walk from which strides are taken [time units].
-        threads: number of threads, by default one per core.
+        execution: threads and progress, see `drive`.
     """
     from hexmj.physics.rollout import drive
 
-    plan = begin(walks.controller, settled.starts, walks.velocity, settled.stride, None, threads)
+    plan = begin(walks.controller, settled.starts, walks.velocity, settled.stride, None, execution.get("threads"))
     first = (walks.duration - measured) / settled.stride.dt * settled.substeps
-    chunks = [chunk for chunk in drive(settled, plan, walks.duration, threads=threads) if chunk.first >= first]
+    chunks = [chunk for chunk in drive(settled, plan, walks.duration, **execution) if chunk.first >= first]
     for start in chunks[-1].ids[~chunks[-1].fell] if chunks else ():
         standing = np.concatenate([chunk.standing[chunk.ids == start][0, :, 0] for chunk in chunks])
         begun = onsets(standing, rows_of_a_hop(settled))
@@ -183,13 +184,16 @@ def onsets(standing: np.ndarray, hop: float) -> np.ndarray:
     return lifted[landed[np.searchsorted(landed, lifted)] - lifted > hop]
 
 
-def quantity_table(walks: WalkSettings, measured: float, threads: int | None = None) -> "xr.Dataset":
+def quantity_table(
+    walks: WalkSettings, measured: float, threads: int | None = None, progress: Progress | None = None
+) -> "xr.Dataset":
     """Compute a cell of the study: `value` over (quantity, start), NaN for a start that falls or has no whole stride.
 
     Args:
         walks: settings of the walks.
         measured: duration of the end of the walk from which strides are taken [time units].
         threads: number of threads, by default one per core.
+        progress: called with the fraction done since the last call.
     """
     import xarray as xr
 
@@ -197,7 +201,7 @@ def quantity_table(walks: WalkSettings, measured: float, threads: int | None = N
 
     settled = Settling(walks.conditions, walks.stride, threads, pushes=True).at(walks.starts)
     values = np.full((len(UNITS), walks.n_starts), np.nan)
-    for start, strides in last_strides(settled, walks, measured, threads):
+    for start, strides in last_strides(settled, walks, measured, threads=threads, progress=progress):
         values[:, start] = list(quantities(strides).values())
     return xr.Dataset({"value": (("quantity", "start"), values, {"units": "of the quantity"})}, {"quantity": [*UNITS]})
 

@@ -15,6 +15,7 @@ from hexmj.measures.figures import caption
 from hexmj.measures.study import UNITS, Study, by_halves, kept_walk, standing_starts
 from hexmj.measures.tables import WalkSettings, differences, frequency, happened, over_start, velocity_axis
 from hexmj.plotting import LEGEND, NOTHING, head, heat_map, picture
+from hexmj.progress import Progress, part_of
 from hexmj.stability import loss_time
 from hexmj.starts import draw_starts
 from hexmj.studies.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
@@ -123,7 +124,7 @@ class StabilityMap(Study):
         for value, conditions in zip(self.chosen, self.varied, strict=True):
             for v, time in zip(*self.observed, strict=True):
                 own = {"walks": self.walks(v, time, conditions), "over": self.over}
-                work = time * conditions.substeps(self.stride)
+                work = expected_work(v, time) * conditions.substeps(self.stride)
                 cells.append(Cell(f"{self.over}-{value:g}-V-{v:g}", fates, own, work))
         return cells
 
@@ -162,7 +163,7 @@ class StabilityMap(Study):
         return self.labelled(with_differences(table, reference), "map", over=self.over, reference=reference)
 
 
-def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dataset":
+def fates(walks: WalkSettings, over: str, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
     """Return loss, fall and mechanism of every start in one cell of a map over the condition `over`.
 
     Starts that cannot stand on six feet, or reach less than nine of ten foot targets, are left out.
@@ -177,7 +178,8 @@ def fates(walks: WalkSettings, over: str, threads: int | None = None) -> "xr.Dat
     blocks = np.split(stands, range(BLOCK, len(stands), BLOCK)) if stands.size else ()
 
     def fate(which: np.ndarray) -> dict[str, np.ndarray]:
-        walk = kept_walk(walks, walks.starts[which], threads)
+        part = part_of(progress, len(which) / len(stands))
+        walk = kept_walk(walks, walks.starts[which], threads=threads, progress=part)
         static = {"static_loss": loss_time(static_plan(walk), threads=threads)}
         return vars(walk.outcomes) | static | {"mechanism": mechanisms(walk), "direction": fall_direction(walk)}
 

@@ -22,6 +22,7 @@ from hexmj.measures.figures import caption
 from hexmj.measures.study import Study, kept_walk
 from hexmj.measures.tables import WalkSettings, over_start
 from hexmj.plotting import LEGEND, MEASURE_STYLES, frequency_curve, head, picture, tidy
+from hexmj.progress import Progress
 from hexmj.stability import loss_time, stability_margin, walk_margin
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration
@@ -151,9 +152,9 @@ class StaticLimit(Study):
         return self.labelled(with_flss(table, LOSSES), "converge", **own)
 
 
-def distance_table(walks: WalkSettings, threads: int | None = None) -> "xr.Dataset":
+def distance_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
     """Compute a cell of the study: the outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start."""
-    walk = kept_walk(walks, walks.starts, threads)
+    walk = kept_walk(walks, walks.starts, threads=threads, progress=progress)
     outcomes = vars(walk.outcomes) | {"grounded_loss": loss_time(grounded(walk), threads=threads)}
     units = dict.fromkeys(LOSSES.values(), "time unit") | REPORTED
     table = over_start({name: outcomes[name] for name in units}, units)
