@@ -42,7 +42,7 @@ def progress_bar(label: str) -> Iterator[Progress]:
             with bar.get_lock():
                 if not bar.initial:
                     bar.desc, bar.initial, bar.start_t, bar.delay = label, done, time.time(), 0.0
-                bar.update(done)
+                bar.update(min(done, bar.total - bar.n))
 
         yield advance
 

@@ -61,6 +61,19 @@ def reporting(seed: int, threads: int | None = 7, progress: Progress | None = No
     return xr.Dataset({"threads": -1 if threads is None else threads, "seed": seed})
 
 
+NOW = [0.0]
+"""Time of a clock that only `working` moves [s]."""
+
+
+def working(number: int, seconds: float, progress: Progress | None = None) -> xr.Dataset:
+    """Let time pass, and report progress in tenths."""
+    for _ in range(10):
+        NOW[0] += seconds / 10
+        if progress:
+            progress(0.1)
+    return xr.Dataset({"number": number})
+
+
 def steps(controller: object, n: int) -> xr.Dataset:
     return xr.Dataset({"steps": ("step", controller.steps(n))})  # pyright: ignore[reportAttributeAccessIssue]
 

@@ -33,5 +33,9 @@ class Reproduce(Command):
         with at_work(given, "reproducing") as execution, as_shipped():
             report = reproduce(given.out, plan.protocol, plan.only, plan.beside, **execution)
         settings = {"protocol": asdict(report.protocol), "only": plan.only, "beside": plan.beside}
-        lines = ["The claims of the 1998 paper", table(*report.table()), *report.summary]
+        starts = f"The claims of the 1998 paper: {report.size}, after obstacles {plan.protocol.obstacle_starts} starts"
+        about = (
+            "walk, start: observation times; *: the claim calibrates a constant; claims.md has intervals and reasons"
+        )
+        lines = [starts, table(*report.table(short=True), None), about, *report.summary]
         return Answer(report.json(), lines, report.files, settings)

@@ -221,11 +221,15 @@ class Biology(StudyCommand):
         return lists_of(result.drop_dims(("start", "speed", "quantity")))
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        from hexmj.studies.biology import HEADS, table_rows, walked_in_words
+        from hexmj.studies.biology import table_rows, walked_in_words
+
+        rows = [row[:4] for row in table_rows(result)]
+        known = [row for row in rows if row[2] != "-"]
 
         yield f"{study.controller.name} and real insects, at 24 mm/s unless a row names another speed"
-        yield table(HEADS, table_rows(result), None)
-        yield f"Starts with complete strides: {walked_in_words(result)}. biology.md names the sources."
+        yield table(("quantity", "ours (95 %)", "insects", "verdict"), known, None)
+        yield f"biology.md has the sources, and {len(rows) - len(known)} more quantities without a figure for insects"
+        yield f"Starts with complete strides: {walked_in_words(result)}"
 
     def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
         from hexmj.files import write_text

@@ -14,6 +14,9 @@ from hexmj.sweep import Cell
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
 from hexmj.validate import whole
 
+FEW = 20
+"""Number of starts whose steps take about as long as the overhead of a step."""
+
 PRINTED = MODEL_VARIANTS["printed"]  # the rules as the paper prints them
 
 FOUND = Path(__file__).with_name("ideal.toml")
@@ -153,7 +156,7 @@ class Measurement:
     preset: str
     """Name of the network, see `Protocol.network`."""
     seconds: float = 1.0
-    """Computing time at all velocities on two cores, for the progress bar [s]."""
+    """Computing time at all velocities of `FULL` on two cores, for the progress bar [s]."""
     accelerated: bool = False
     """Whether walks accelerate by Eq. 11."""
     own: Mapping[str, Any] = field(default_factory=dict)
@@ -195,10 +198,12 @@ def cells(name: str, protocol: Protocol) -> dict[float, Cell]:
     """Return the cell (see `sweep.Cell`) of a measurement at each of its velocities, by velocity."""
     measurement = MEASUREMENTS[name]
     velocities: tuple[float, ...] = getattr(protocol, measurement.at)
-    work = measurement.seconds / len(velocities)
+    seconds = measurement.seconds / len(getattr(FULL, measurement.at))
 
     def cell(v: float) -> Cell:
-        settings = {"velocity": v, "seed": protocol.seed} | measurement.settings(v, protocol)
-        return Cell(f"{name} {v:g}", measurement.function, settings, work)
+        own, full = (measurement.settings(v, each) for each in (protocol, FULL))
+        effort, most = ((each.get("n_starts", 1) + FEW) / each["stride"].dt for each in (own, full))
+        settings = {"velocity": v, "seed": protocol.seed} | own
+        return Cell(f"{name} {v:g}", measurement.function, settings, seconds * effort / most)
 
     return {v: cell(v) for v in velocities}

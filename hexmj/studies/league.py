@@ -14,7 +14,7 @@ from hexmj.measures.study import GROUND
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import Case
 from hexmj.studies.league_cells import ControllerStudy, EntrantWalks, is_ideal
-from hexmj.studies.standings import LEGS_LOST, TRIALS, standings
+from hexmj.studies.standings import LEGS_LOST, READING, TRIALS, standings
 from hexmj.sweep import Cell
 from hexmj.timing import Acceleration, observation_duration
 from hexmj.validate import whole
@@ -28,8 +28,11 @@ RANGE = (0.1, 0.5)
 FINAL = 0.9
 """Velocity V_r to which kinematic walks accelerate by Eq. 11."""
 
-KINEMATIC_COST = 0.05
+KINEMATIC_COST = 0.015
 """Computing time of a time unit of a kinematic walk, as a fraction of that of a physical walk."""
+
+FEW = 4
+"""Number of starts whose physical steps take about as long as the overhead of a step."""
 
 MOST_GAIT_STARTS = 50
 """Maximum number of starts whose steady-state gait is measured."""
@@ -112,7 +115,7 @@ class League(ControllerStudy):
 
         def cell(question: str, cost: float, method: str, changed: Mapping[str, Any], **own: Any) -> tuple[str, Cell]:
             own_walks = replace(walks, **changed)
-            work = float(cost * own_walks.n_starts)  # estimated computing time, relative to other cells
+            work = float(cost * (own_walks.n_starts + FEW))  # estimated computing time, relative to other cells
             return question, Cell(f"{name} {question}", getattr(own_walks, method), own, work)
 
         for v, time in zip(*(axis.tolist() for axis in self.observed), strict=True):
@@ -121,7 +124,7 @@ class League(ControllerStudy):
             yield cell(f"physics {v}", time, "outcomes", at | physics)
             if not ideal:
                 few = at | {"n_starts": min(every, MOST_GAIT_STARTS)}
-                yield cell(f"gait {v}", 20 * time * KINEMATIC_COST, "gaits", few, periods=self.periods)
+                yield cell(f"gait {v}", 25 * time * KINEMATIC_COST, "gaits", few, periods=self.periods)
         if ideal:
             return
         low, high = RANGE
@@ -131,7 +134,7 @@ class League(ControllerStudy):
             eq11 = Acceleration()
             time = self._time(FINAL) + eq11.duration(FINAL)
             speeding = {"velocity": FINAL, "duration": time, "acceleration": eq11}
-            yield cell("accelerated", 10_000 * KINEMATIC_COST, "losses", speeding)
+            yield cell("accelerated", 6_000 * KINEMATIC_COST, "losses", speeding)
         for trial, leg in LEGS_LOST.items():
             yield cell(f"kinematic, {trial}", 200 * KINEMATIC_COST, "losses", {"controller": LegLost(controller, leg)})
         pushes = can_push(self.conditions, self.stride, tried)
@@ -141,7 +144,8 @@ class League(ControllerStudy):
                 if isinstance(controller, SteerableController) and (pushes or trial != "push"):
                     yield cell(trial, 300, "disturbed", trials, case=case)
             elif (reaches or trial not in GROUNDS) and (changed := self.trial_settings(trial, controller)):
-                yield cell(trial, 180, "outcomes", trials | changed)
+                cost = 720 if trial in READING else 180
+                yield cell(trial, cost, "outcomes", trials | changed)
 
     def _time(self, velocity: float) -> float:
         """Return the observation time at a velocity V_r [time units]."""
