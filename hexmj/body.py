@@ -55,9 +55,9 @@ class Lengths:
     highest_stand: float = 14.0
     """Maximum standing height [mm]."""
     slowest_swing: float = 0.1
-    """Minimum velocity V_p of a protracting tip relative to the body [mm/s]."""
+    """Minimum velocity V_p of a swinging foot relative to the body [mm/s]."""
     fastest_swing: float = 2000.0
-    """Maximum velocity V_p of a protracting tip relative to the body [mm/s]."""
+    """Maximum velocity V_p of a swinging foot relative to the body [mm/s]."""
     shortest_leg: float = 31.0
     """Length of the shortest leg [mm]; it is also the maximum height of an obstacle and the depth of a gap."""
     farthest_centre_of_mass: float = 30.0

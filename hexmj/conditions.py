@@ -38,7 +38,7 @@ class Conditions:
     """
 
     vp: float = 80.0
-    """Velocity V_p of a protracting tip relative to the body [mm/s]; the plan's time unit is 1 mm / V_p."""
+    """Velocity V_p of a swinging foot relative to the body [mm/s]; the plan's time unit is 1 mm / V_p."""
 
     step_height: float = 12.0
     """Height to which a swinging foot is lifted [mm]. The default exceeds the clearance of the trunk, so that a

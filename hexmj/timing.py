@@ -1,6 +1,6 @@
 """Step range, time step, acceleration (Eq. 11) and observation time of a walk.
 
-A time unit is 1 mm / V_p: the time in which a protracting tip moves 1 mm.  Velocities V are fractions of V_p.
+A time unit is 1 mm / V_p: the time in which a swinging foot moves 1 mm.  Velocities V are fractions of V_p.
 """
 
 import math
@@ -41,7 +41,7 @@ class Stride:
     pep_min: float = -20.0
     """Rearmost posterior extreme position that influences can set [mm]."""
     dt: float = 0.1
-    """Time step of a plan, dt in Eq. 6 [time units; a protracting tip moves 1 mm per time unit]."""
+    """Time step of a plan, dt in Eq. 6 [time units; a swinging foot moves 1 mm per time unit]."""
     geometry: Geometry = field(default=FIG1)
     """Lines of the tips: fig1, as in Fig. 1 of the paper, or centred, with the centre of mass above O_2."""
 

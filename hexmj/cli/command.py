@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from hexmj.sweep import Study
 
 
+MANY = 12
+"""Number of files from which on only their folder is printed."""
+
+
 @dataclass
 class Answer:
     """Answer of a command: its JSON object, its tables and lines for the terminal, and the content of its manifest."""
@@ -98,7 +102,8 @@ class Command:
             print(json_text(head | dict(answer.json) | {"files": files}))
         else:
             line = [] if result is None else [settings_line(given, result)]
-            show(*answer.lines, *line, *map(str, files), *answer.closing)
+            paths = map(str, files) if len(files) < MANY else [f"{len(files)} files in {given.out}"]
+            show(*answer.lines, *line, *paths, *answer.closing)
 
 
 class StudyCommand(Command):

@@ -140,7 +140,7 @@ def _ablated(data: "xr.Dataset") -> str:
     if data.controller.item() == data.whole.item() or change != change:
         return frequency
     significant = "*" if data.more_low.item() > 0 or data.more_high.item() < 0 else ""
-    return f"{frequency} ({change:+.3f}{significant})"
+    return f"{frequency} ({f'{change:+.2f}'.replace('0.', '.')}{significant})"
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ class FlssOptions:
     n_starts: int | None = None
     """Number of random starts; by default 7000 (seven samples of 1000, as in the paper), or 200 with --physical."""
     out: Path | None = None
-    """Folder for figure, NetCDF, manifest and cached results; by default nothing is written."""
+    """Folder for figure, NetCDF, manifest and cached results; by default nothing is saved."""
     physical: bool = False
     """Count falls of the insect in MuJoCo instead of losses of the planned stability."""
     range_of: int | None = None
@@ -95,7 +95,7 @@ class FlssOptions:
 
 class Flss(StudyCommand):
     """Measure the kinematic or physical FLSS (frequency of the loss of static stability) of a controller at one or more
-    velocities. Repeat the command to resume a stopped run with --out."""
+    velocities. Without --out, nothing is saved; with it, repeat the command to resume a stopped run."""
 
     study = "measures.kinematic:KinematicFlss"
     own = (FlssOptions,)

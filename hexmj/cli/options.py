@@ -319,12 +319,12 @@ def _member(option: Option, texts: Mapping[str, str], *markers: Any) -> Any:
         kind = tuple[inner, ...] | None if optional else tuple[inner, ...]
         default = default if default is None or default is MISSING else tuple(default)
     if name == "controller":
-        text = f"{text} {'Each is' if several else 'It is'} {CONTROLLER}.".strip()
+        text = f"{text or 'Controller that plans the walk.'} {'Each is' if several else 'It is'} {CONTROLLER}."
     choices = "{" + ",".join(map(str, get_args(inner))) + "}" if get_origin(inner) is Literal else None
     metavar = METAVARS.get(name) or choices or TYPES.get(inner, "")
     metavar = f"{metavar} ..." if several else metavar
     hint: Any = {"help_behavior_hint": ""} if default is None or default is False or default == () else {}
-    hint |= {"metavar": f"[{metavar}]" if markers else metavar} if metavar else {}
+    hint |= {"metavar": f"[{metavar}]" if markers and default is not MISSING else metavar} if metavar else {}
     described = Annotated[kind, arg(name=name.replace("_", "-"), help=text, **hint), *markers]
     return name, described, field() if default is MISSING else field(default=default)
 
@@ -339,8 +339,9 @@ def _texts(*settings: type) -> dict[str, str]:
                 match statement, text:
                     case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
                         texts[NAMES.get(name, name)] = " ".join(words.split())
-    return {
-        "acceleration": "Acceleration a of Eq. 11 from --initial-velocity to --velocity [1 / time unit]; the paper's is"
-        " 0.00008. By default, walks do not accelerate.",
-        "initial_velocity": "V_r at the beginning of a walk with --acceleration, a fraction of V_p; by default 0.1.",
-    } | texts
+    initial = "V_r at the beginning of a walk with --acceleration; by default 0.1."
+    acceleration = (
+        "Acceleration a of Eq. 11 from --initial-velocity to --velocity [1 / time unit]; the paper's is 0.00008."
+    )
+    acceleration += " By default, walks do not accelerate."
+    return {"initial_velocity": initial} | texts | {"acceleration": acceleration}

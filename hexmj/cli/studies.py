@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from hexmj.cli.command import StudyCommand
-from hexmj.cli.output import Column, difference, grid, interval, lists_of, over_velocity, table
+from hexmj.cli.output import HEADS, Column, difference, grid, interval, lists_of, over_velocity, table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +57,8 @@ class Map(StudyCommand):
 
         saved: dict[str, Column] = {"static": lambda data: f"{data.static.item():.3f}", "saved": _saved}
         changes = {name: partial(difference, measure=name) for name in ("dynamics", "change")}
-        axes, over, at = (study.over, "velocity"), study.over.replace("_", " "), result.rename(value=study.over)
+        axes, at = (study.over, "velocity"), result.rename(value=study.over)
+        over = HEADS.get(study.over, study.over.replace("_", " "))
         yield f"{study.controller.name} over {over}: FLSS, with 95 % intervals"
         yield "physical: falls; Froude: the number (V V_p)^2 / (g h)"
         froude = {"Froude": lambda data: f"{data.froude.item():.2g}"}
@@ -68,7 +69,7 @@ class Map(StudyCommand):
             f" {result.attrs['reference']:g}"
         )
         yield grid(at, axes, saved | changes)
-        yield f"Number of starts at each {over} by what happens to them (hexmj.studies.mechanisms defines the names)"
+        yield f"Number of starts at each {over} by what keeps them up or makes them fall (see hexmj.studies.mechanisms)"
         yield table(("velocity", "starts", *(f"{value:g}" for value in result.value.values)), _mechanisms(result), 2)
         stand = (f"{n} at {value:g}" for n, value in zip(result.stand.values, result.value.values, strict=True))
         yield (

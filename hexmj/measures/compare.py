@@ -41,7 +41,7 @@ class Comparison(Study):
     velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
     """Velocities V_r as fractions of V_p, 0 <= V < 1; the final velocities when accelerating."""
     observation_time: str | float = "walk"
-    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
     acceleration: Acceleration | None = None
     """The accelerating procedure of Eq. 11; without it the velocity is constant."""
     n_starts: int = field(default=60, kw_only=True)

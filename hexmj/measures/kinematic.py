@@ -98,7 +98,7 @@ class KinematicFlss:
     n_starts: int = 7 * SAMPLE
     """Number N of random starts, the same for every velocity."""
     observation_time: str | float = "walk"
-    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
     seed: int = 0
     """Seed of the random starts."""
     stride: Stride = STRIDE

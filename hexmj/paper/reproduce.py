@@ -106,7 +106,8 @@ class Report:
         names = ("ours", *self.rows[0].beside)
         answers = tuple(f"{name}, {time}" for name in names for time in OBSERVATION_TIMES)
         if short:
-            return ("section", "the paper", "value", *answers), [row.short_cells for row in self.rows]
+            heads = ("section", "the paper", "value", *(name.removeprefix("ours, ") for name in answers))
+            return heads, [row.short_cells for row in self.rows]
         heads = "section", "the paper", "its value", "kind", *answers, "fits", "why"
         return heads, [row.cells for row in self.rows]
 

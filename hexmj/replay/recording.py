@@ -89,7 +89,7 @@ class Start:
     start: int = 0
     """Number of the start among the random starts of the seed."""
     observation_time: str | float = "walk"
-    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
     stride: Stride = Stride()
     acceleration: Acceleration | None = None
     conditions: Conditions = Conditions()

@@ -29,7 +29,7 @@ SWITCHES = (*(f"without-{part}" for part in (1, 2, 3, 4, 5)), "with-2", "with-4"
 """Suffixes by which `load_controller` leaves a mechanism or rule of a controller out, or adds one."""
 
 MEASURES = {
-    "start": "kinematic loss within two protractions",
+    "start": "kinematic loss within two swings",
     "walk": "kinematic loss within three periods",
     "limit": "no statically stable steady-state gait",
     "physical": "fall within three periods",

@@ -59,7 +59,7 @@ class DisturbedWalks(Study):
     velocities: Sequence[float] = (0.3, 0.5, 0.7)
     """Velocities V_r as fractions of V_p, 0 < V < 1."""
     disturbances: Sequence[Kind] = ("halt", "leg", "push")
-    """Disturbances: the body is halted, one protracting leg is stopped, or the body is pushed from the side."""
+    """Disturbances: the body is halted, one swinging leg is stopped, or the body is pushed from the side."""
     impulses: Sequence[float] = (40.0, 60.0)
     """Impulses of the pushes, in multiples of the insect's mass times V_p."""
     strategies: Sequence[Answer] = ("reorganise", "slow_down", "grasp")
@@ -74,7 +74,7 @@ class DisturbedWalks(Study):
     kinematic: bool = False
     """Compute kinematic walks only, without pushes and the strategy 'grasp', which need the simulated body."""
     observation_time: str | float = "walk"
-    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
     n_starts: int = field(default=40, kw_only=True)
     """Number of random starts whose plan is stable until the disturbance, the same for every case at a velocity."""
 

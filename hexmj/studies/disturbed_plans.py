@@ -26,7 +26,7 @@ from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, copied, joined
 
 Kind = Literal["halt", "leg", "push"]
-"""Disturbance: all legs halt, one protracting leg is stopped, or the body is pushed, which does not change the plan."""
+"""Disturbance: all legs halt, one swinging leg is stopped, or the body is pushed, which does not change the plan."""
 
 NEVER = 2**62
 """Step number that stands for an event that has not happened yet."""

@@ -69,7 +69,7 @@ class League(ControllerStudy):
     accelerating: bool = True
     """Whether to add kinematic walks that accelerate to V_r = 0.9; they take half of the kinematic computing time."""
     observation_time: str | float = "walk"
-    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
 
     hidden: ClassVar[tuple[str, ...]] = ("load", *GROUND)
 

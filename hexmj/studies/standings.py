@@ -26,7 +26,7 @@ TRIALS = ("halt", "leg", "push", "step", "rough", "load", *LEGS_LOST, *READING)
 """Names of all trials of the league."""
 
 ABOUT_TRIALS = (
-    "halt, leg, push: a halt, a protracting leg that is stopped, a push of 40 m V_p, in walks with stable plans until"
+    "halt, leg, push: a halt, a swinging leg that is stopped, a push of 40 m V_p, in walks with stable plans until"
     " then; step, rough: ground of 0.3 of the body's standing height; load: twice the weight; lost: without one leg;"
     " reads: sensory feedback; noise: with errors of 10 % of the step range; late: delayed by 20 ms; -: the plan cannot"
     " be steered or has no feedback, the walk is too short, or no walk is left"

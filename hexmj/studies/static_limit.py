@@ -97,11 +97,11 @@ class StaticLimit(Study):
     velocity: float = 0.5
     """Velocity V_r as a fraction of V_p, 0 <= V < 1; the final velocity when accelerating."""
     vps: Sequence[float] = (400.0, 200.0, 100.0, 50.0, 25.0)
-    """Velocities V_p of a protracting tip [mm/s]."""
+    """Velocities V_p of a swinging foot [mm/s]."""
     leg_masses: Sequence[float] = (1.0, 0.01)
     """Masses of the legs as fractions of the mass of the insect's own legs; the legs of the paper have no mass."""
     observation_time: str | float = "walk"
-    """Observation time: 'walk' (three periods of a single leg), 'start' (two protractions) or a number [time units]."""
+    """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
     acceleration: Acceleration | None = None
     """The accelerating procedure of Eq. 11; without it the velocity is constant."""
     n_starts: int = field(default=200, kw_only=True)
@@ -141,7 +141,7 @@ class StaticLimit(Study):
         """
         mass = {"units": "1", "long_name": "mass of the legs over the insect's own"}
         table = over_axes({"leg_mass": len(self.leg_masses), "vp": len(self.vps)}, data).assign_coords(
-            vp=("vp", list(self.vps), {"units": "mm/s", "long_name": "velocity V_p of a protracting tip"}),
+            vp=("vp", list(self.vps), {"units": "mm/s", "long_name": "velocity V_p of a swinging foot"}),
             leg_mass=("leg_mass", list(self.leg_masses), mass),
         )
         lost = table.planned_loss < np.inf
