@@ -44,7 +44,9 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]], repeated: int | No
     from rich.console import Console
     from rich.table import Table
 
-    columns = [*zip([HEADS.get(name, name.replace("_", " ")) for name in head], *rows, strict=True)]
+    columns = [
+        *zip([HEADS.get(name, name.replace("_", " ") if name.islower() else name) for name in head], *rows, strict=True)
+    ]
     width, widths = Console().width, [max(map(len, column)) for column in columns]
     parts = [columns[:repeated]]
     for column, own in zip(columns[repeated:], widths[repeated:], strict=True) if repeated else ():

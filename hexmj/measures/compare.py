@@ -53,8 +53,8 @@ class Comparison(Study):
         cells = []
         for name, controller in self.controllers.items():
             for v, t in zip(*self.observed, strict=True):
-                own = {"walks": self.walks(v, t, self.conditions, controller)}
-                cells.append(Cell(f"{name}-V-{v:g}", outcome_table, own, tables.expected_work(v, t)))
+                walks = self.walks(v, t, self.conditions, controller)
+                cells.append(Cell(f"{name}-V-{v:g}", outcome_table, {"walks": walks}, walks.work))
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

@@ -15,7 +15,7 @@ from hexmj.controllers.planning import advanced, begin, check_velocities, first_
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.io import attributes
-from hexmj.measures.tables import WalkSettings, expected_work, frequency_table, losses_by_sample, observed, settings
+from hexmj.measures.tables import WalkSettings, frequency_table, losses_by_sample, observed, settings
 from hexmj.progress import Progress
 from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs
 from hexmj.stats import wilson_interval
@@ -130,9 +130,9 @@ class KinematicFlss:
         for i, first in self.places:
             (v, duration), count = np.transpose(self.observed)[i], min(self.range_of, self.n_starts - first)
             same = self.seed, Conditions(), self.stride, self.acceleration
-            settings = {"walks": WalkSettings(self.controller, v, duration, count, *same), "first": first}
+            walks = WalkSettings(self.controller, v, duration, count, *same)
             name = f"{self.controller.name}-V-{v:g}-from-{first}"
-            cells.append(Cell(name, losses_of_range, settings, work=expected_work(v, duration) * count))
+            cells.append(Cell(name, losses_of_range, {"walks": walks, "first": first}, walks.work))
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

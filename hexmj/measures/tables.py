@@ -49,6 +49,11 @@ class WalkSettings:
         """Tips at time 0, (start, leg) [mm]."""
         return draw_starts(self.n_starts, self.seed, self.stride)
 
+    @property
+    def work(self) -> float:
+        """Relative computing time of the walks; losses and falls end more of the fast walks early."""
+        return self.duration * (1.0 - self.velocity) * self.n_starts
+
 
 def reach(stride: Stride) -> tuple[float, float]:
     """Return how far a front foot can be ahead of O, and how far a hind foot can be behind O [mm]."""
@@ -75,11 +80,6 @@ def observed(
         raise InputError(f"{reached}, but the walk ends after {duration[late[0]]:g}; increase the observation time")
     steps_within(duration, stride)
     return v, duration
-
-
-def expected_work(velocity: float, duration: float) -> float:
-    """Return the relative computing time of a walk: losses and falls end more of the fast walks."""
-    return duration * (1.0 - velocity)
 
 
 def velocity_axis(v: np.ndarray, duration: np.ndarray) -> dict[str, Any]:

@@ -123,8 +123,8 @@ class StabilityMap(Study):
         cells = []
         for value, conditions in zip(self.chosen, self.varied, strict=True):
             for v, time in zip(*self.observed, strict=True):
-                own = {"walks": self.walks(v, time, conditions), "over": self.over}
-                work = expected_work(v, time) * conditions.substeps(self.stride)
+                walks = self.walks(v, time, conditions)
+                own, work = {"walks": walks, "over": self.over}, walks.work * conditions.substeps(self.stride)
                 cells.append(Cell(f"{self.over}-{value:g}-V-{v:g}", fates, own, work))
         return cells
 

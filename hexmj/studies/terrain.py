@@ -103,7 +103,7 @@ class Terrain(Study):
         cells = []
         for (obstacle, conditions), grasp, v in product(self.obstacles.items(), self.grasps, self.observed[0]):
             walks = self.walks(v, self.distance / v, replace(conditions, grasp=grasp))
-            cells.append(Cell(f"{obstacle}-grasp-{grasp:g}-V-{v:g}", outcome_table, {"walks": walks}, 1 / v))
+            cells.append(Cell(f"{obstacle}-grasp-{grasp:g}-V-{v:g}", outcome_table, {"walks": walks}, walks.work))
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
