@@ -153,8 +153,9 @@ def test_targets_extras_and_links_exist():
     for page, content in PAGES.items():
         for link in re.findall(r"\]\((?!https?:)([^)#\s]+)", content):
             assert (ROOT / page).parent.joinpath(link).exists(), (page, link)
-    text += "".join(path.read_text(encoding="utf-8") for path in ROOT.glob("hexmj/**/*.py"))
-    named = {path for path in re.findall(r"\b(?:docs|examples|benchmarks|tests|hexmj)/[\w/]+\.(?:py|md|png)", text)}
+    package = "".join(path.read_text(encoding="utf-8") for path in ROOT.glob("hexmj/**/*.py"))
+    named = {*re.findall(r"\bdocs/[\w/]+\.\w+", package)}
+    named |= {path for path in re.findall(r"\b(?:docs|examples|benchmarks|tests|hexmj)/[\w/]+\.(?:py|md|png)", text)}
     assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
 
 
