@@ -49,8 +49,9 @@ def executed(path: Path) -> Any:
     book, log = nbformat.read(path, as_version=4), ["--log-level=ERROR"]  # no warnings about the local connection
     search = {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}  # to find the command hexmj
     with TemporaryDirectory() as folder:
-        settings: Any = {"resources": {"metadata": {"path": folder}}, "record_timing": False, "extra_arguments": log}
-        NotebookClient(book, timeout=120, **settings).execute(env={"MUJOCO_GL": "egl", **os.environ, **search})
+        settings: Any = {"resources": {"metadata": {"path": folder}}, "record_timing": False, "coalesce_streams": True}
+        client = NotebookClient(book, timeout=120, extra_arguments=log, **settings)
+        client.execute(env={"MUJOCO_GL": "egl", **os.environ, **search})
     book.metadata.language_info = {"name": "python"}
     return book
 
