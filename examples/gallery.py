@@ -40,7 +40,7 @@ def film(recordings: list[Dataset], path: Path, settings: hexmj.Film, body: hexm
     with TemporaryDirectory() as folder:
         video = Path(folder) / "film.mp4"
         frames = hexmj.render(recordings, video, settings, body=body)
-        convert = ["-i", video, "-loop", "0", "-quality", "50", "-compression_level", "4", path]
+        convert = ["-i", video, "-loop", "0", "-quality", "45", "-compression_level", "4", path]
         subprocess.run([get_ffmpeg_exe(), "-loglevel", "error", "-y", *map(str, convert)], check=True)
     print(f"{path}: {frames} frames, {path.stat().st_size / 1000:.0f} kB")
 

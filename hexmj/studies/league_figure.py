@@ -21,7 +21,7 @@ COLUMNS = 4
 SHARE: dict[str, Any] = {"vmin": 0.0, "vmax": 1.0}
 """Options of the colour scale of fractions and phases: from 0 to 1."""
 
-NOTES = f"in brackets: rank by falls; {FEWER} fewer starts, others diverged or were out of reach; {NOTHING} unknown"
+NOTES = f"in brackets: rank by falls (=: shared); {FEWER} fewer starts, others diverged or out of reach; {NOTHING} unknown"
 """Explanation of the marks in the cells of the heat maps."""
 
 KINEMATIC = MEASURE_STYLES["kinematic"]["color"]
