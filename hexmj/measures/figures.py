@@ -110,18 +110,13 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
         axes.set_visible(False)
     handles, _ = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=2)
-    head(figure, _exceeding(result), caption(result), "bars: 95 % intervals")
-    return figure
-
-
-def _exceeding(result: "xr.Dataset") -> str:
-    """Return the velocities at which more starts lose planned stability than fall, beyond the 95 % interval."""
     lost, fell = (happened(result[outcome]).values for outcome in ("planned_loss", "fall"))
-    more, says = paired_difference(lost, fell)[1] > 0.0, "the kinematic FLSS exceeds the frequency of falls"
-    if len(more) > FEW:
-        return f"{says} in {more.sum()} of {more.size} cases (controller and velocity)"
-    named = zip(result.controller.values, more, strict=True)
-    return f"{says}: " + "; ".join(f"{in_figure(name)} {where(result.velocity.values, row)}" for name, row in named)
+    more = paired_difference(lost, fell)[1] > 0.0  # beyond the 95 % interval
+    found = [f"{in_figure(name)} {where(result.velocity.values, row)}" for name, row in zip(names, more, strict=True)]
+    found = found if len(names) <= FEW else [f"in {more.sum()} of {more.size} cases"]
+    finding = f"the kinematic FLSS exceeds the frequency of falls: {'; '.join(found)}"
+    head(figure, finding, caption(result), "bars: 95 % intervals")
+    return figure
 
 
 def flss_figure(result: "xr.Dataset") -> "Figure":

@@ -28,9 +28,6 @@ Measurements = Mapping[str, "xr.Dataset"]
 SAMPLES = 7
 """Number of samples of starts, whose mean FLSS and standard deviation are drawn."""
 
-BINS = 51
-"""Number of bins of a phase histogram; it is odd, so that the phase 0.5 is in the middle of a bin."""
-
 RELATIVE = {2: "o", 3: "s"}
 """Legs whose phases relative to leg 1 are drawn -> their symbols."""
 
@@ -108,7 +105,7 @@ def phase_histograms(measured: Measurements, model: str) -> "tuple[Figure, xr.Da
 
     gaits = measured[f"{model} gaits"]
     gaits = gaits.isel(velocity=np.unique(np.linspace(0, gaits.sizes["velocity"] - 1, 5).round().astype(int)))
-    v, edges = gaits.velocity.values, np.linspace(0, 1, BINS + 1)
+    v, edges = gaits.velocity.values, np.linspace(0, 1, 52)  # odd number of bins: 0.5 is in the middle of one
     stable = [kept(gaits.sel(velocity=at)).phase for at in v]
     counts = np.array([[np.histogram(one.sel(pair=pair), edges)[0] for pair in PAIRS] for one in stable])
     figure = picture(8.6, 7.4)

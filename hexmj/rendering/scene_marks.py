@@ -11,9 +11,6 @@ STABLE = (0.05, 0.55, 0.32)
 UNSTABLE = (0.84, 0.24, 0.02)
 """Red, green and blue from 0 to 1 of support polygons; an unstable polygon is also unfilled, with a thick outline."""
 
-STRONGER = 1.8
-"""Thickness of the outline of an unstable support polygon / that of a stable one."""
-
 CENTRE = (0.98, 0.72, 0.10)
 TIP = (0.13, 0.36, 0.72)
 
@@ -29,7 +26,7 @@ def mark_support(scene: mujoco.MjvScene, marks: Marks, corners: np.ndarray, leve
         _triangle(scene, points[0], second, third, (*colour, 0.35))
     for a, b in zip(points, np.roll(points, -1, axis=0), strict=True):
         if (a != b).any():
-            _rod(scene, a, b, marks.outline * (1.0 if stable else STRONGER), (*colour, 1.0))
+            _rod(scene, a, b, marks.outline * (1.0 if stable else 1.8), (*colour, 1.0))
 
 
 def mark_centre_of_mass(scene: mujoco.MjvScene, marks: Marks, centre: np.ndarray, level: float, stable: bool) -> None:

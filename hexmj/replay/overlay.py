@@ -23,9 +23,6 @@ MINUS, TIMES = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 CAPTION, STRIP, DIAGRAM = 48, 18, 80
 """Heights on a frame of 640 x 480 pixels, as all sizes in this file. The body's cameras keep these areas free."""
 
-BAR = 75
-"""Maximum length of the scale bar, on a frame of 640 x 480 pixels [pixels]."""
-
 
 class Overlay:
     """Draws caption, scale bar, legend and footfall diagram of one take on frames of one size."""
@@ -68,7 +65,7 @@ class Overlay:
         image.paste(self._legend, (image.width - self._legend.width, 0), self._legend)
         draw, middle = ImageDraw.Draw(image), image.height // 2
         if scale > 0:
-            longest = self._pixels(BAR) / scale
+            longest = self._pixels(75) / scale
             power = 10.0 ** np.floor(np.log10(longest))
             length = max(float(power * part) for part in (1, 2, 5) if power * part <= longest)
             end = edge + round(length * scale)

@@ -30,12 +30,6 @@ ENCODINGS: dict[str, dict[str, Any]] = {
 }
 """Suffix of a film's name -> options of the encoder."""
 
-BRIGHTER = 1.2
-"""Factor on the ground's colour in films without shadows, because MuJoCo renders these darker."""
-
-IN_A_ROW = 3
-"""Maximum number of recordings in one row of a film."""
-
 GROUND = "ground"
 """Name of the ground's texture, if the MJCF has one."""
 
@@ -99,7 +93,7 @@ def _frames(
     takes: Sequence[Take], overlays: Sequence[Overlay], times: np.ndarray, film: Film, progress: Progress | None
 ) -> Iterator[np.ndarray]:
     """Yield frames with the takes side by side at `times` of the walk, (frame,) [s]; a second thread draws overlays."""
-    rows = 1 if len(takes) <= IN_A_ROW else 2
+    rows = 1 if len(takes) <= 3 else 2
     columns = -(-len(takes) // rows)
     picture = np.full((film.height * rows, film.width * columns, 3), 255, dtype=np.uint8)
     panels = [panel for row in np.split(picture, rows) for panel in np.split(row, columns, axis=1)][: len(takes)]
@@ -141,7 +135,7 @@ def _filmed_body(film: Film, conditions: Conditions) -> mujoco.MjModel:
         ground = model.texture(i)
         begin = int(ground.adr[0])
         colours = model.tex_data[begin : begin + int(ground.width[0] * ground.height[0] * ground.nchannel[0])]
-        colours[:] = np.minimum(BRIGHTER * colours, 255)
+        colours[:] = np.minimum(1.2 * colours, 255)  # MuJoCo renders the ground darker without shadows
     return model
 
 

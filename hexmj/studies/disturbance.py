@@ -38,9 +38,6 @@ PHYSICAL = ("push", "grasp")
 MOST_IMPULSE = 80.0
 """Maximum impulse of a push, in multiples of m V_p; a larger impulse throws the insect into the air."""
 
-SHIFTS = dict(zip(STYLES, np.linspace(-0.02, 0.02, len(STYLES)), strict=True))
-"""Strategy -> shift of its points in V_r / V_p, so that the points of one velocity do not overlap."""
-
 ABOUT = "no strategy", "reorganise: next stable posture", "slow down: for a while", "grasp: feet adhere"
 LABELS = dict(zip(STYLES, ABOUT, strict=True))
 """Strategy -> label of its curve."""
@@ -210,7 +207,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
     figure = picture(max(7.0, 1.0 + 2.3 * len(kinds)), 1.3 + 2.2 * len(measures))
     panels = figure.subplots(len(measures), len(kinds), sharex=True, sharey=True, squeeze=False)
     data = result.sel(observation_time="whole").sortby("velocity").transpose("velocity", "case", ...)
-    v, empty = data.velocity.values, []
+    v, empty, shifts = data.velocity.values, [], dict(zip(STYLES, np.linspace(-0.02, 0.02, len(STYLES)), strict=True))
     for (row, column), axes in np.ndenumerate(panels):
         measure, kind = measures[row], kinds[column]
         if measure == "kinematic" and kind.startswith("push"):
@@ -223,7 +220,7 @@ def disturbed_figure(result: "xr.Dataset") -> "Figure":
             axes.plot(v, data[measure].isel(case=case), **UNDISTURBED, zorder=5)
         for case in np.flatnonzero((names == kind) & ((strategies != "grasp") | (measure == "physical"))):
             style = STYLES[strategies[case]] | {"label": LABELS[strategies[case]]}
-            frequency_curve(axes, v + SHIFTS[strategies[case]], data.isel(case=case), measure, **style)
+            frequency_curve(axes, v + shifts[strategies[case]], data.isel(case=case), measure, **style)
         flss_axes(axes, v, ROWS[measure])
         axes.label_outer()
         axes.tick_params(labelleft=column == 0)

@@ -15,13 +15,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
-COLUMNS = 4
-"""Number of panels in a figure."""
-
 SHARE: dict[str, Any] = {"vmin": 0.0, "vmax": 1.0}
 """Options of the colour scale of fractions and phases: from 0 to 1."""
 
-NOTES = f"in brackets: rank by falls (=: shared); {FEWER} fewer starts, others diverged or out of reach; {NOTHING} unknown"
+NOTES = (
+    f"in brackets: rank by falls (=: shared); {FEWER} fewer starts, others diverged or out of reach; {NOTHING} unknown"
+)
 """Explanation of the marks in the cells of the heat maps."""
 
 KINEMATIC = MEASURE_STYLES["kinematic"]["color"]
@@ -75,10 +74,10 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
 
 
 def _drawn(finding: str, shown: "xr.Dataset", panels: list[Panel], note: str) -> "tuple[Figure, Any, list[AxesImage]]":
-    """Draw panels in a figure of `COLUMNS` axes with a row for each entrant; return figure, axes and heat maps."""
+    """Draw panels in a figure of four axes with a row for each entrant; return figure, axes and heat maps."""
     rows, images = shown.sizes["entrant"], []
     figure = picture(10.0, 2.6 + 0.18 * rows)
-    axes = figure.subplots(1, COLUMNS, sharey=True)
+    axes = figure.subplots(1, 4, sharey=True)
     for ax, (title, values, colours, fewer, ends) in zip(axes, panels, strict=False):
         marks = np.where(np.isfinite(values), np.where(fewer, FEWER, ""), NOTHING)
         images.append(heat_map(ax, shown.velocity.values, values, marks, cmap=colours, **ends))

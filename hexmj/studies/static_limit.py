@@ -60,9 +60,6 @@ REPORTED = {"slip": "mm/s", "tracking": "mm"}
 FINE = Conditions(longest_substep=0.5)
 """Default conditions: light legs need physics steps of at most 0.5 ms."""
 
-LINES = ("-", "--", ":", "-.")
-"""Line styles of the masses of the legs, in this order."""
-
 STYLES: dict[str, dict[str, Any]] = MEASURE_STYLES | {
     "pressure": {"color": "0.55", "marker": "v", "label": "centre of pressure"},
     "same_feet": {"color": "#e7b97c", "marker": "s", "label": "measured, while the planned feet stand"},
@@ -226,6 +223,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
 
     figure, result = picture(10.0, 7.4), result.sortby("vp")
     panels, masses, vps = figure.subplots(2, 2, sharex=True).ravel(), result.leg_mass.values, result.vp.values
+    lines = ("-", "--", ":", "-.") * len(masses)
     alone, style = result.isel(leg_mass=0, vp=0), STYLES["kinematic"] | {"marker": None}  # kinematic FLSS has one value
     panels[0].axhspan(alone.kinematic_low.item(), alone.kinematic_high.item(), alpha=0.15, color=style["color"], lw=0)
     handles = {"kinematic": panels[0].axhline(alone.kinematic.item(), **style)}
@@ -233,7 +231,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
         shifts = 2.0 ** (0.08 * (np.arange(len(masses) * len(curves)) - (len(masses) * len(curves) - 1) / 2))
         for (curve, mass), shift in zip(product(curves.items(), range(len(masses))), shifts, strict=True):
             (name, look), data = curve, result.isel(leg_mass=mass)
-            style = STYLES[look] | {"linestyle": LINES[mass % len(LINES)]}
+            style = STYLES[look] | {"linestyle": lines[mass]}
             if title == "share of the starts":
                 frequency_curve(axes, vps * shift, data, name, **style)
             else:
@@ -246,8 +244,7 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
         tidy(axes)
     for axes in panels[2:]:
         axes.set_xlabel("$V_p$ [mm/s], logarithmic")
-    lines = zip(masses, LINES * len(masses), strict=False)
-    black = [Line2D([], [], color="0.1", linestyle=line, label=f"mass of the legs x {mass:g}") for mass, line in lines]
+    black = [Line2D([], [], color="0.1", ls=lines[n], label=f"mass of the legs x {m:g}") for n, m in enumerate(masses)]
     named = [drawn for name, drawn in handles.items() if name != "drift"]
     figure.legend(handles=[*named, *black], **LEGEND, loc="outside lower center", ncols=3)
     agreement = result.agreement.isel(leg_mass=0).values
