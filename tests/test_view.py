@@ -135,7 +135,7 @@ def test_a_browser_shows_the_walk(view):
     """The readout follows the walk; nothing comes from elsewhere."""
     view.step(0.02)
     with tab() as opened:
-        opened.resize(640, 480)
+        opened.resize(1280, 800)
         opened.open(view.address)
         opened.wait("document.body.innerText.includes('margin')")
         before = view.session.walk.moment.seconds
@@ -144,4 +144,6 @@ def test_a_browser_shows_the_walk(view):
         assert view.session.walk.moment.seconds > before
         opened.wait(f"document.body.innerText.includes('{view.session.walk.moment.seconds:.2f} s')")
         assert opened.value("document.querySelectorAll('canvas').length") >= 1
+        rows = "[...document.querySelectorAll('svg text')].find((text) => text.textContent === 'R3')"
+        opened.wait(f"{rows} && {rows}.getBoundingClientRect().bottom < 800")  # all footfalls without scrolling
         assert all(request.startswith((view.address, "data:", "blob:")) for request in opened.requests)
