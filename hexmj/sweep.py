@@ -100,8 +100,7 @@ class Execution(TypedDict, total=False):
     """Executor that computes the cells in threads, in processes or on other machines that share the folder; by default,
     this process computes the cells one after another."""
     progress: Progress | bool | None
-    """True shows a progress bar; a function is called with the fraction of the work done since its last call. Cached
-    cells are no work."""
+    """True shows a progress bar; a function is called with the fraction of the new work done since its last call."""
     threads: int | None
     """Number of threads of each cell; by default one per core, or one if there is an executor."""
     fresh: bool
@@ -152,7 +151,7 @@ def finished_cells(
     def advance(i: int, fraction: float) -> None:
         fraction = min(fraction, 1.0 - done[i])
         done[i] += fraction
-        if callable(progress):
+        if fraction and callable(progress):
             progress(fraction * cells[i].work / total)
 
     yield from ((i, _cached(path)) for i, path in enumerate(paths) if path and i not in left)
@@ -199,11 +198,8 @@ def _on_executor(
     """Yield cells as they finish; call `reached` with the fraction of a cell that a worker on this machine has done."""
     with TemporaryDirectory() as folder:
         reports = np.memmap(Path(folder, "done"), float, "w+", shape=len(paths))
-        report = partial(_report, str(reports.filename))
-        futures = {
-            executor.submit(_computed, cell, paths[i], threads=threads, progress=partial(report, i)): i
-            for i, cell in cells.items()
-        }
+        how = {i: {"threads": threads, "progress": partial(_report, str(reports.filename), i)} for i in cells}
+        futures = {executor.submit(_computed, cell, paths[i], **how[i]): i for i, cell in cells.items()}
         running = set(futures)
         try:
             while running:

@@ -53,25 +53,17 @@ def counted(log: str, number: int, wait: float = 0.0, fails: bool = False) -> xr
     return xr.Dataset({"number": float(number)})
 
 
-def reporting(seed: int, threads: int | None = 7, progress: Progress | None = None) -> xr.Dataset:
-    """Report progress in quarters, and return the number of threads."""
-    for _ in range(3 if progress else 0):
-        assert progress
-        progress(0.25)
-    return xr.Dataset({"threads": -1 if threads is None else threads, "seed": seed})
-
-
 NOW = [0.0]
-"""Time of a clock that only `working` moves [s]."""
+"""Time of a clock that only `reporting` moves [s]."""
 
 
-def working(number: int, seconds: float, progress: Progress | None = None) -> xr.Dataset:
-    """Let time pass, and report progress in tenths."""
-    for _ in range(10):
-        NOW[0] += seconds / 10
+def reporting(seed: int, seconds: float = 0.0, threads: int | None = 7, progress: Progress | None = None) -> xr.Dataset:
+    """Let time pass, report progress in quarters, and return the number of threads."""
+    for _ in range(4):
+        NOW[0] += seconds / 4
         if progress:
-            progress(0.1)
-    return xr.Dataset({"number": number})
+            progress(0.25)
+    return xr.Dataset({"threads": -1 if threads is None else threads, "seed": seed})
 
 
 def steps(controller: object, n: int) -> xr.Dataset:

@@ -20,6 +20,7 @@ import xarray as xr
 
 import hexmj
 from hexmj.errors import InputError
+from hexmj.measures.kinematic import KinematicFlss
 from hexmj.sweep import Cell, over_axes, run_cells, run_study, threads_each, workers
 from small_cells import (
     ENVIRONMENT,
@@ -190,7 +191,7 @@ def test_the_key_names_sources_settings_and_four_versions(mine: Path) -> None:
 
 
 def test_the_key_of_a_cell_of_hexmj_names_hexmj_alone() -> None:
-    (cell,) = hexmj.measures.kinematic.KinematicFlss(hexmj.LDVS, [0.5]).cells()  # pyright: ignore
+    (cell,) = KinematicFlss(hexmj.LDVS, [0.5]).cells()
     assert {*json.loads(cell.record())["sources"]} == {"hexmj"}
 
 

@@ -31,8 +31,8 @@ kinematic: the centre of mass leaves the support polygon of the planned feet
 measured: it leaves the polygon of the feet that carry load in the simulation
 physical: falls, that is, the trunk touches the ground
 
-Starts on which kinematic and physical measure agree (agree), with a kinematic
-loss and a fall (both), only a loss (kin.), only a fall (phys.) or neither (none)"""
+agree: fraction of starts with both a kinematic loss and a fall, or neither
+both, kin., phys., none: starts with both, only a loss, only a fall, neither"""
 """Lines that explain the tables of `hexmj compare`."""
 
 TOPPLED = "toppled: the trunk tilts by more than 0.1 rad"
@@ -205,7 +205,7 @@ class Compare(StudyCommand):
         yield grid(result, axes, columns | {name: name for name in MEASURES})
         yield EXPLAINED
         yield grid(result, axes, answers)
-        yield TOPPLED
+        yield f"{TOPPLED}; speed: walked over commanded, of starts without a fall"
         yield report_line(physical_report(result))
 
 

@@ -1,7 +1,7 @@
 """`hexmj reproduce`: measure what the paper's claims need, judge every claim, and draw the figures."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -58,30 +58,16 @@ class Row:
     @property
     def cells(self) -> tuple[str, ...]:
         """Texts of the row: claim, answers for all variants and observation times, `fits` and `why`."""
-        claim = self.claim
+        claim, cells = self.claim, []
+        for answers in (self.answers, *self.beside.values()):
+            cells += [*map(_cell, answers.values()), "same"][: len(OBSERVATION_TIMES)]
         kind = ": ".join(filter(None, (claim.kind, "; ".join(claim.calibrates))))
-        return claim.section, claim.text, claim.value, kind, *self._answers(_cell), self.fits, self.why
-
-    @property
-    def short_cells(self) -> tuple[str, ...]:
-        """Texts of the row for a screen: claim, with * if it is calibrated, and verdicts with values."""
-        mark = "*" if self.claim.calibrates else ""
-        return self.claim.section, f"{self.claim.text}{mark}", self.claim.value, *self._answers(_short)
-
-    def _answers(self, text: Callable[[Answer | None], str]) -> list[str]:
-        """Return the texts of the answers for all variants and observation times."""
-        several = ([*map(text, answers.values()), "same"] for answers in (self.answers, *self.beside.values()))
-        return [cell for answers in several for cell in answers[: len(OBSERVATION_TIMES)]]
+        return claim.section, claim.text, claim.value, kind, *cells, self.fits, self.why
 
 
 def verdict(answer: Answer | None) -> str:
     """Return 'agrees', 'differs' or `NOT_SEARCHED`."""
     return NOT_SEARCHED if answer is None else "agrees" if answer.agrees else "differs"
-
-
-def _short(answer: Answer | None) -> str:
-    """Return the verdict and the value of an answer."""
-    return verdict(answer) + (f" {answer.value:.3g}" if answer and answer.value == answer.value else "")
 
 
 def _cell(answer: Answer | None) -> str:
@@ -101,21 +87,12 @@ class Report:
     protocol: Protocol
     files: list[Path] = field(default_factory=list)
 
-    def table(self, short: bool = False) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return heads and rows of the table of claims, with columns for each model variant; `short`: for a screen."""
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Return the column heads and the rows of the table of claims, with a column for each model variant."""
         names = ("ours", *self.rows[0].beside)
-        answers = tuple(f"{name}, {time}" for name in names for time in OBSERVATION_TIMES)
-        if short:
-            heads = ("section", "the paper", "value", *(name.removeprefix("ours, ") for name in answers))
-            return heads, [row.short_cells for row in self.rows]
+        answers = (f"{name}, {time}" for name in names for time in OBSERVATION_TIMES)
         heads = "section", "the paper", "its value", "kind", *answers, "fits", "why"
         return heads, [row.cells for row in self.rows]
-
-    @property
-    def size(self) -> str:
-        """Text with the numbers of starts."""
-        p = self.protocol
-        return f"{p.samples} times {p.sample} starts, gaits from {p.gait_starts} starts; seed {p.seed}"
 
     @property
     def summary(self) -> list[str]:
@@ -130,8 +107,9 @@ class Report:
 
     def markdown(self) -> str:
         """Return a Markdown document: the table, and for every claim its rule and the command that recomputes it."""
-        heads, rows = self.table()
-        head = f"{self.size}.  An answer is the value that is farthest from agreeing with the rule,"
+        p, (heads, rows) = self.protocol, self.table()
+        size = f"{p.samples} times {p.sample} starts, gaits from {p.gait_starts} starts"
+        head = f"{size}; seed {p.seed}.  An answer is the value that is farthest from agreeing with the rule,"
         rows = [[cell.replace("differs:", "**differs**:") for cell in row] for row in rows]
         rules = [(row.claim.text, row.claim.rule.words, f"`{self.command(row)}`") for row in self.rows]
         lines = [
