@@ -65,9 +65,7 @@ def test_work_that_ends_at_once_prints_nothing(capsys):
 
 
 @pytest.mark.parametrize("cached", [0, 10])
-def test_the_time_left_is_right_from_a_tenth_on_also_after_a_resumption(
-    cached: int, tmp_path: Path, monkeypatch, capsys
-):
+def test_the_time_left_is_right_also_after_a_resumption(cached: int, tmp_path: Path, monkeypatch, capsys):
     cells = [Cell(f"{i}", reporting, {"seed": i, "seconds": s}, work=s) for i, s in enumerate([80.0, 10.0] * 10)]
     run_cells(cells[:cached], tmp_path)
     for place in ("time.time", "tqdm.std.time"):

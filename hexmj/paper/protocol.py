@@ -17,6 +17,9 @@ from hexmj.validate import whole
 FEW = 20
 """Number of starts whose steps take about as long as the overhead of a step."""
 
+FILE = 0.03
+"""Time in which the file of a cell is written and read [s]."""
+
 PRINTED = MODEL_VARIANTS["printed"]  # the rules as the paper prints them
 
 FOUND = Path(__file__).with_name("ideal.toml")
@@ -204,6 +207,6 @@ def cells(name: str, protocol: Protocol) -> dict[float, Cell]:
         own, full = (measurement.settings(v, each) for each in (protocol, FULL))
         effort, most = ((each.get("n_starts", 1) + FEW) / each["stride"].dt for each in (own, full))
         settings = {"velocity": v, "seed": protocol.seed} | own
-        return Cell(f"{name} {v:g}", measurement.function, settings, seconds * effort / most)
+        return Cell(f"{name} {v:g}", measurement.function, settings, seconds * effort / most + FILE)
 
     return {v: cell(v) for v in velocities}
