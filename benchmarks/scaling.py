@@ -20,6 +20,7 @@ from benchmarks.table import description, print_table
 from hexmj import LDVS, flss, physical_flss
 from hexmj.files import write_text
 from hexmj.io import json_text
+from hexmj.plotting import MEASURE_STYLES
 from hexmj.threads import thread_count
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FLSS: dict[str, Callable[..., "xr.Dataset"]] = {"kinematic": flss, "physical": physical_flss}
-COLOURS = {"kinematic": "#1b6ca8", "physical": "#b3261e"}
 LABELS = {
     "starts": "number of starts",
     "velocities": "number of velocities",
@@ -107,7 +107,7 @@ def figure(measured: Sequence[Curve]) -> "Figure":
     """Draw time against each size: measured points, and a line of proportional time."""
     from matplotlib.figure import Figure
 
-    result = Figure(figsize=(9.0, 4.8), layout="constrained")
+    result = Figure(figsize=(10.0, 5.2), layout="constrained")
     for curve, axes in zip(measured, result.subplots(2, 4, sharey="row").flat, strict=True):
         draw(curve, axes)
     return result
@@ -120,21 +120,21 @@ def draw(curve: Curve, axes: "Axes") -> None:
     size, seconds, work = np.array(curve.size, dtype=float), np.array(curve.seconds), curve.work
     line = seconds[0] * size[0] / size if curve.against == "threads" else seconds[-1] * size / size[-1]
     axes.loglog(size, line, color="0.55", linewidth=0.9, label="proportional")
-    axes.loglog(size, seconds, "o", color=COLOURS[curve.measure], markersize=4.5, label="measured")
+    axes.loglog(size, seconds, "o", color=MEASURE_STYLES[curve.measure]["color"], markersize=4.5, label="measured")
     if curve.against != "starts":
         ticks = curve.size[::3] if curve.against == "t" else curve.size
         axes.set_xticks(ticks, [f"{n:g}" for n in ticks])
         axes.xaxis.set_minor_locator(NullLocator())
     else:
         axes.set_ylabel(f"{curve.measure} FLSS: time [s]", fontsize=9)
-        axes.legend(frameon=False, fontsize=8)
+        axes.legend(frameon=False, fontsize=9)
     axes.set_xlabel(LABELS[curve.against], fontsize=9)
-    axes.tick_params(labelsize=8)
+    axes.tick_params(labelsize=9)
     axes.grid(color="0.92", linewidth=0.7)
     axes.spines[["top", "right"]].set_visible(False)
     others = {"starts": f"starts: {work.starts:,}", "t": f"t = {work.t:g}", "velocity": f"V = {work.velocity:g}"}
     shown = ", ".join(text for key, text in others.items() if key != curve.against)
-    axes.set_title(f"{shown}\n{curve.growth}", fontsize=8, loc="left", color="0.25")
+    axes.set_title(f"{shown}\n{curve.growth}", fontsize=9, loc="left", color="0.25")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -131,9 +131,11 @@ def head(figure: "Figure", finding: str, *conditions: str) -> None:
 
 def where(v: np.ndarray, holds: np.ndarray) -> str:
     """Return in words at which of the increasing velocities, (velocity,), something holds, such as "at V = 0.5"."""
-    at, last = [f"{one:g}" for one in v[holds]], bool(holds[v.size - holds.sum() :].all())
-    text = f"from V = {at[0]} on" if last and len(at) > 1 else f"at V = {', '.join(at)}" if at else "at no V"
-    return text.replace(" ", "\N{NO-BREAK SPACE}")
+    rows, at = np.flatnonzero(holds), [f"{one:g}" for one in v[holds]]
+    text = f"at V = {', '.join(at)}" if at else "at no V"
+    if len(at) > 1 and rows[-1] - rows[0] == len(rows) - 1:
+        text = f"from V = {at[0]} " + (f"to {at[-1]}" if rows[-1] < len(v) - 1 else "on")
+    return text.replace(" ", "\N{NO-BREAK SPACE}", 5)
 
 
 def in_figure(text: str) -> str:

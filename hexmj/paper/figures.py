@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.legs import LEGS
+from hexmj.measures.figures import TIMES
 from hexmj.measures.tables import VELOCITY
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import kept, main_peak
@@ -92,9 +93,9 @@ def phase_figure(measured: Measurements, model: str) -> "tuple[Figure, xr.Datase
         for leg, label in zip(RELATIVE, ("Gait II (Wilson)", None), strict=True):
             axes.plot(v, data.wilson.sel(leg=leg), "x", color=IDEAL, markersize=8, zorder=3, label=label)
     axes.set(xlabel="velocity $V$", ylabel="relative phase", xlim=(0, 1), ylim=(0, 1))
-    ends = " and ".join(f"{peak[0, n]:.2f} at V = {v[n]:g}" for n in (0, -1))
+    ends = ", ".join(f"{peak[0, n]:.2f} at V = {v[n]:g}" for n in (0, -1))
     starts = f"phases of stable steady-state gaits; {gaits.sizes['start']} starts at each V; lines: main peaks"
-    head(figure, f"{model.upper()}: the main phase of leg 2 is {ends}", starts)
+    head(figure, f"{model.upper()}: phase of leg 2 is {ends}", starts)
     axes.legend(frameon=False, fontsize=10)
     return figure, data
 
@@ -118,7 +119,11 @@ def phase_histograms(measured: Measurements, model: str) -> "tuple[Figure, xr.Da
         axes.set_title(f"$V$ = {at:g}\n{one.sizes['start']} stable gaits", fontsize=10)
     for axes, pair in zip(panels[:, 0], PAIRS, strict=True):
         axes.set_ylabel(f"$\\Phi$ {pair}", rotation=0, ha="right", va="center", fontsize=12)
-    head(figure, f"{model.upper()}: relative phases of its stable steady-state gaits", "pairs of legs in rows")
+    head(
+        figure,
+        f"{model.upper()}: relative phases of its stable steady-state gaits",
+        "legs 1 to 3 left, 4 to 6 right, from front to rear",
+    )
     figure.supxlabel("relative phase", fontsize=11)
     figure.supylabel("number of starts", fontsize=11)
     middle = (edges[:-1] + edges[1:]) / 2, {"units": "1", "long_name": "relative phase"}
@@ -168,8 +173,10 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
     axes.set(xlabel="velocity $V$", ylabel="kinematic FLSS", xlim=(0, 1), ylim=(-0.02, 1.04))
     model = list(curves)[1]
     lower = where(data.velocity.values, (data.flss.sel(curve=model) < data.flss[0]).values)
-    shown = f"Fig. {number}; observation time '{observation_time}'; {data.attrs['samples']}; bars: standard deviations"
-    head(figure, f"{curves[model][0]}: lower FLSS than without coordination {lower}", shown)
+    shown = f"Fig. {number}; observation time: {TIMES[observation_time]}; samples: {data.attrs['samples']}"
+    head(
+        figure, f"{curves[model][0]}: lower FLSS than without coordination {lower}", shown, "bars: standard deviations"
+    )
     axes.legend(frameon=False, fontsize=10)
     return figure, data
 
