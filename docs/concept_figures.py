@@ -9,10 +9,11 @@ from matplotlib.figure import Figure
 
 import hexmj
 from hexmj.legs import LEGS
-from hexmj.plotting import MEASURE_STYLES
+from hexmj.plotting import MEASURE_STYLES, SERIES
 from hexmj.walks import spans
 
-BLUE, ORANGE, RED, _ = COLORS = [style["color"] for style in MEASURE_STYLES.values()]
+BLUE, RED = (MEASURE_STYLES[measure]["color"] for measure in ("kinematic", "physical"))
+TEAL, PINK, BROWN, *_ = COLORS = [style["color"] for style in SERIES]
 GREY, BOLD, STRIDE = "0.45", {"weight": "bold", "va": "center", "ha": "center"}, hexmj.Stride()
 STYLE = {"font.size": 12, "axes.titlesize": 13, "axes.spines.top": False, "axes.spines.right": False}
 STYLE |= {"legend.frameon": False, "figure.constrained_layout.use": True, "savefig.dpi": 110}
@@ -38,13 +39,13 @@ def network(figure: Figure) -> None:
     seen_from_above(left, "axes of the legs, seen from above")
     for name, y, ahead in zip(LEGS, STRIDE.geometry.y, STRIDE.geometry.origin, strict=True):
         left.vlines(-y, ahead - 20, ahead - 10, colors=GREY, linestyles=":")
-        left.vlines(-y, ahead - 10, ahead + 10, colors=BLUE, linewidth=3)
-        left.hlines([ahead + 10, ahead - 10, ahead - 20], -y - 2, -y + 2, colors=[RED, ORANGE, GREY], linewidth=3)
+        left.vlines(-y, ahead - 10, ahead + 10, colors=TEAL, linewidth=3)
+        left.hlines([ahead + 10, ahead - 10, ahead - 20], -y - 2, -y + 2, colors=[PINK, BROWN, GREY], linewidth=3)
         left.plot([0, -y], [ahead, ahead], "o-", color=GREY, linewidth=0.8, markevery=[1], markersize=6)
         left.text(-y - 5.5 * np.sign(y), ahead, name, fontsize=14, **BOLD)
         distance = f"{y:g}" if y > 0 else f"{ahead:+g}".replace("-", "\N{MINUS SIGN}")
         left.text(-8.2 * np.sign(y), ahead + 0.7, f"{distance} mm", ha="center", fontsize=11)
-    for x, y, name, color in ((-21, 38, "AEP$_0$", RED), (-21, 18, "PEP$_0$", ORANGE), (-18, -40, "PEP$_{min}$", GREY)):
+    for x, y, name, color in ((-21, 38, "AEP$_0$", PINK), (-21, 18, "PEP$_0$", BROWN), (-18, -40, "PEP$_{min}$", GREY)):
         left.text(x, y, name, color=color, ha="right", va="center")
     left.plot(0, 0, "kP", markersize=10)
     left.text(2.8, -3, "centre\nof mass", fontsize=11, va="center")
@@ -66,7 +67,7 @@ def third_mechanism(figure: Figure) -> None:
     """Draw how mechanism 3 shifts the PEP of the leg behind, over the position of its sender (Eq. 4)."""
     axes, x = figure.subplots(), np.linspace(-10, 10, 801)
     curves = [("HWS, any V", hexmj.HWS, 0.5), ("LDVS, V = 0.1", hexmj.LDVS, 0.1), ("LDVS, V = 0.9", hexmj.LDVS, 0.9)]
-    for (name, preset, velocity), color, line in zip(curves, (BLUE, RED, ORANGE), ("-", "--", "-."), strict=True):
+    for (name, preset, velocity), color, line in zip(curves, COLORS, ("-", "--", "-."), strict=False):
         p, neutral = preset.weights, preset.weights.p31_i + preset.weights.p34_i * velocity
         shift = np.minimum(np.where(x <= neutral, p.p32_i, p.p33_i) * (neutral - x), 4.0)
         axes.plot(x, shift, color=color, linestyle=line, linewidth=2.5, label=name)
@@ -87,7 +88,7 @@ def footfalls(figure: Figure) -> None:
         last = walk.time > walk.time[-1] - 2 * period
         for leg in range(6):
             bars = spans((walk.time[last] - walk.time[last][0]) / period, ~walk.stance[last, 0, leg])
-            axes.broken_barh(bars, (5.15 - leg, 0.7), color=BLUE if leg < 3 else ORANGE)
+            axes.broken_barh(bars, (5.15 - leg, 0.7), color=TEAL if leg < 3 else BROWN)
         axes.set(xlim=(0, 2), ylim=(0, 6), xticks=[0, 0.5, 1, 1.5, 2], title=f"{preset.name.upper()}, V = {velocity}")
         axes.set_yticks(np.arange(5.5, 0, -1), LEGS)
     figure.supxlabel("time [periods of an uncoupled leg]; bars: leg in swing", fontsize=12)

@@ -17,6 +17,7 @@ import hexmj
 from hexmj.body import Servo
 from hexmj.controllers import Controller, FeedbackPlan, Plan
 from hexmj.legs import LEGS, SIDE, Geometry
+from hexmj.plotting import MEASURE_STYLES
 
 HIPS = {"1": (124.8, 61.64), "2": (0.0, 103.4), "3": (-124.8, 61.64)}  # forward, sideways from the middle [mm]
 COXA, FEMUR, TIBIA, FOOT = 54.0, 66.1, 160.0, 8.0  # lengths, and the foot's radius [mm]
@@ -193,13 +194,12 @@ def main(n_starts: int = 40) -> None:
     figure, panels = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True, layout="constrained")
     for axes, (name, cells) in zip(panels, walks.items(), strict=True):
         answers = fallen(cells, n_starts)
-        for measure, style, label in (
-            ("kinematic", "k--", "lost static stability"),
-            ("toppled", "s-", "tilted by more than 0.1 rad"),
-            ("physical", "o-", "trunk touched the ground"),
-        ):
-            axes.plot(answers.vp, answers[measure], style, label=label)
-            print(f"{name}, {label}: {dict(zip(cells, answers[measure].values.round(3).tolist(), strict=True))}")
+        for measure in ("kinematic", "toppled", "physical"):
+            style = MEASURE_STYLES[measure]
+            axes.plot(answers.vp, answers[measure], **style)
+            print(
+                f"{name}, {style['label']}: {dict(zip(cells, answers[measure].values.round(3).tolist(), strict=True))}"
+            )
         axes.set(title=f"{name}, V = 0.5", xscale="log", xlabel="swing velocity V_p [mm/s]", ylim=(-0.03, 1))
         axes.set_xticks(list(cells), [f"{vp:g}" for vp in cells], minor=False)
         axes.minorticks_off()
