@@ -86,6 +86,9 @@ def test_a_result_and_its_figures_stay_the_same_when_saved_and_loaded(name: str,
     assert read.equals(result) and hexmj.settings(read) == hexmj.settings(result)
     for which in FIGURES[name]:
         assert pixels(read, which) == pixels(result, which)
+        figure = hexmj.plot(result, which)
+        sizes = [float(text.get_fontsize()) for text in figure.findobj(Text) if text.get_text().strip()]
+        assert min(sizes) * 10.0 / figure.get_figwidth() >= 9.0, "legible on a slide of 10 inches"
 
 
 @pytest.mark.parametrize("name", few_of([name for name in MADE if name != "recording"], "flss", "compare", "search"))
@@ -174,13 +177,6 @@ def test_the_title_names_what_differs_from_the_defaults() -> None:
     assert title.count("lasting") == 2 and "9.5" in title
     shown = head_of(made("compare").sel(controller=["null"]))
     assert "null" in shown and NAME[:2] not in shown
-
-
-@pytest.mark.parametrize("name", few_of(MADE, *QUICK, "map", "terrain"))
-def test_texts_are_legible_on_a_slide_of_10_inches(name: str) -> None:
-    for figure in (hexmj.plot(made(name), which) for which in FIGURES[name]):
-        sizes = [float(text.get_fontsize()) for text in figure.findobj(Text) if text.get_text().strip()]
-        assert min(sizes) * 10.0 / figure.get_figwidth() >= 9.0
 
 
 @pytest.mark.parametrize(

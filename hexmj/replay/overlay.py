@@ -79,15 +79,14 @@ class Overlay:
         """Return the legend of the marks in the scene and of the diagram's bars."""
         tip, polygon, centre = (tuple(round(255 * part) for part in colour) for colour in (TIP, STABLE, CENTRE))
         marks = ("●", INK), ("▬", self._swing), ("◎", tip), ("■", polygon), ("●", centre)
-        names = "foot stands", "○ foot swings", "planned tip", "support polygon", "centre of mass"
-        font, right = _font(self._pixels(11)), 0.0
-        widths = [font.getlength(f"{mark} {name}  ") for (mark, _), name in zip(marks, names, strict=True)]
-        image = Image.new("RGBA", (round(sum(widths)), self._pixels(STRIP)), (*PAPER, 0))
-        draw, middle = ImageDraw.Draw(image), image.height / 2
-        for (mark, colour), name, width in zip(marks, names, widths, strict=True):
-            draw.text((right, middle), mark, colour, font, "lm")
-            draw.text((right + font.getlength(f"{mark} "), middle), name, INK, font, "lm")
-            right += width
+        text = "● foot stands  ▬ ○ foot swings  ◎ planned tip  ■ support polygon  ● centre of mass  "
+        font = _font(self._pixels(11))
+        image = Image.new("RGBA", (round(font.getlength(text)), self._pixels(STRIP)), (*PAPER, 0))
+        draw, middle, end = ImageDraw.Draw(image), image.height / 2, 0
+        draw.text((0, middle), text, INK, font, "lm")
+        for mark, colour in marks:
+            end = text.index(mark, end) + 1
+            draw.text((font.getlength(text[: end - 1]), middle), mark, colour, font, "lm")
         return image
 
     def _caption(self, background: np.ndarray, row: int, seconds: float) -> np.ndarray:

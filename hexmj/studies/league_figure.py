@@ -28,8 +28,7 @@ POINTS = {"range": ("o", KINEMATIC, -0.14), "accelerated": ("D", "white", 0.14)}
 """FLSS that is not given per velocity -> marker, its fill, and vertical shift of its point in the entrant's row."""
 
 
-Panel = tuple[str, np.ndarray, str, np.ndarray | bool, dict[str, Any]]
-"""Title of a heat map, its numbers (entrant, column), colour map, whether walks are missing, ends of the colours."""
+Panel = tuple[str, np.ndarray, str, np.ndarray | bool, dict[str, Any]]  # title, numbers, colours, walks missing, ends
 
 
 def league_figure(result: "xr.Dataset") -> "Figure":
