@@ -114,8 +114,9 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
     more = paired_difference(lost, fell)[1] > 0.0  # beyond the 95 % interval
     found = [f"{in_figure(name)} {where(result.velocity.values, row)}" for name, row in zip(names, more, strict=True)]
     found = found if len(names) <= FEW else [f"in {more.sum()} of {more.size} cases"]
-    finding = f"the kinematic FLSS clearly exceeds the frequency of falls: {'; '.join(found)}"
-    head(figure, finding, caption(result), "bars: 95 % intervals")
+    exceeds = "exceeds the frequency of falls"
+    finding = f"clearly {exceeds}: {'; '.join(found)}" if more.any() else f"nowhere clearly {exceeds}"
+    head(figure, f"the kinematic FLSS {finding}", caption(result), "bars: 95 % intervals")
     return figure
 
 
