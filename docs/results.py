@@ -175,7 +175,8 @@ def main() -> None:
         page.write_text(text, encoding="utf-8")
         print(f"{page.name}: {len(text.split())} words")
     for path in IMAGES.glob("*.png"):  # 192 colours make a figure three times smaller
-        Image.open(path).convert("RGB").quantize(192, dither=Image.Dither.NONE).save(path, optimize=True)
+        if (image := Image.open(path)).mode != "P":
+            image.convert("RGB").quantize(192, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 if __name__ == "__main__":
