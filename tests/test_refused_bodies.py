@@ -48,7 +48,7 @@ def test_descriptions_that_make_no_sense_or_do_not_fit_the_mjcf_are_refused(case
 
 
 ROOT, WORLD, OPTION, JOINT = '<freejoint name="root"/>', "</worldbody>", "<option ", '<joint armature="1" '
-FLAG, PAIR, TRUNK, HEAD = '<flag island="disable"', '<pair condim="3"', '<geom name="mesothorax" ', '<geom name="head" '
+PAIR, TRUNK = '<pair condim="3"', '<geom name="mesothorax" '
 CONTACTS, SITE = "  </contact>", '<site name="R3_foot" '
 TENDON = '</worldbody><tendon><spatial><site site="L1_foot"/><site site="L2_foot"/></spatial></tendon>'
 MJCFS: dict[str, dict[str, str]] = {
@@ -63,8 +63,6 @@ MJCFS: dict[str, dict[str, str]] = {
     "a damped root": {ROOT: '<joint type="free" name="root" limited="false" damping="500"/>'},
     "soft contacts": {'solref="0.00125 1"': 'solref="0.05 1"'},
     "feet that touch each other": {CONTACTS: f'<pair geom1="L1_foot" geom2="L2_foot"/>{CONTACTS}'},
-    "trunk geom elsewhere": {HEAD: '<geom name="skull" ', WORLD: f'{HEAD}size="1"/>{WORLD}'},
-    "no contacts": {FLAG: f'{FLAG} contact="disable"'},
     "explicit integrator": {"implicitfast": "RK4"},
     "a joint of no leg": {SITE: f'<body><joint name="spur"/><geom size="0.1" mass="1e-6"/></body>{SITE}'},
     "limited joint torque": {JOINT: f'{JOINT}actuatorfrcrange="-9 9" '},
