@@ -17,7 +17,7 @@ from hexmj.stability import walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.validate import number, whole
-from hexmj.walks import Walk, footfall_html, part_of
+from hexmj.walks import Walk, part_of
 
 TOLERANCE = 0.002
 """Maximum change of a leg's cycle or lag within a steady-state gait, as a fraction of the period; `STEPS` add to it."""
@@ -62,17 +62,6 @@ class Gait:
             duty = self.duty_factor[known].mean()
             line += f"; period {self.period[known].mean():.4g} time units, duty factor {duty:.2f}"
         return f"{line})"
-
-    def _repr_html_(self) -> str | None:
-        """Return a footfall diagram for notebooks, as HTML: two periods of the first periodic gait."""
-        if not self.periodic.any():
-            return None
-        start = int(np.argmax(self.periodic))
-        phase, time = dict(zip(PAIRS, self.phase[start], strict=True)), np.linspace(0.0, 2.0, 801)[1:]
-        onset = np.cumsum([[0.0, phase["1-2"], phase["2-3"]], [phase["1-4"], phase["4-5"], phase["5-6"]]], axis=1)
-        protracted = (time[:, np.newaxis] - onset.ravel()) % 1.0  # time since the onset, in periods
-        swings = protracted < 1.0 - self.duty_factor[start]
-        return footfall_html(repr(self), time * self.period[start], swings, f"start {start}")
 
 
 def gait(walk: Walk) -> Gait:

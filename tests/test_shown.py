@@ -62,13 +62,6 @@ def test_a_notebook_shows_the_feet_that_are_off_the_ground(walked: hexmj.Physica
     assert max(end for several in bars(html).values() for _, end in several) <= fall / 60 + 2e-3
 
 
-def test_a_notebook_shows_two_periods_of_a_gait(found: Gait):
-    assert found.periodic[0]
-    for leg, several in bars(found._repr_html_() or "").items():
-        off = sum(end - begin for begin, end in several)
-        assert off == pytest.approx(1.0 - found.duty_factor[0, leg], abs=4e-3)
-
-
 def test_nothing_that_can_be_shown_is_no_error():
     tips = np.zeros((0, 0, 6))
     empty = hexmj.Walk(np.zeros(0), np.zeros((0, 0)), tips, tips, tips.astype(bool))
