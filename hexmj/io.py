@@ -127,23 +127,23 @@ def save_manifest(command: Sequence[str], settings: Mapping[str, Any], files: Se
         files: files that the command wrote, in the manifest's folder or below it.
         path: file of the manifest.
     """
-    versions = {"hexmj": __version__} | {name: version(name) for name in LIBRARIES}
-    versions["python"] = platform.python_version()
     names = [file.relative_to(path.parent).as_posix() for file in files]
-    content = {"command": list(command), "settings": dict(settings), "versions": versions, "files": names}
+    content = {"command": list(command), "settings": dict(settings), "versions": versions(), "files": names}
     return write_text(path, json_text(content) + "\n")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of hexmj, Python and the packages that change numbers, by name."""
+    return {"hexmj": __version__, "python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
     """Read a manifest that `save_manifest` wrote.
 
     Raises:
-        InputError: the file cannot be read, or is not a manifest.
+        InputError: the file cannot be read.
     """
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {error}") from None
-    if not isinstance(manifest, dict) or not {"command", "settings", "versions", "files"} <= manifest.keys():
-        raise InputError(f"{path} is not a manifest; expected a {MANIFEST} that a hexmj command wrote")
-    return manifest

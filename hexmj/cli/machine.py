@@ -1,15 +1,12 @@
 """`hexmj doctor` and `hexmj rerun`."""
 
 import os
-import platform
 import subprocess
 import sys
 import tempfile
-import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from dataclasses import dataclass
-from importlib.metadata import metadata, requires, version
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +15,7 @@ from typing import Any
 from hexmj.cli.command import Command
 from hexmj.cli.options import Output
 from hexmj.cli.output import report_checks, show
+from hexmj.controllers import conformance
 from hexmj.errors import InputError
 
 RENDERING = """
@@ -33,22 +31,16 @@ with mujoco.Renderer(model, 48, 64) as renderer:
 
 
 @dataclass(frozen=True)
-class Finding:
-    """Result of one check."""
+class Finding(conformance.Finding):
+    """Result of one check; it is a note if only an optional package is missing."""
 
-    name: str
-    well: bool
-    found: str
-    """What the check found, or its error."""
     remedy: str = ""
     """What to do if the check fails."""
-    note: bool = False
-    """True if only an optional package is missing."""
 
 
 class Doctor(Command):
-    """Check Python and package versions, threads, rendering, films, compiled code and a short walk. A failed check
-    names a remedy, and the exit code is then 1."""
+    """List the versions of packages, and check rendering, films, compiled code and a short walk. A failed check names
+    a remedy, and the exit code is then 1."""
 
     sources = (Output,)
     examples = ("", "--json")
@@ -62,37 +54,16 @@ def examine() -> Iterator[Finding]:
     for name, (check, remedy) in CHECKS.items():
         try:
             yield Finding(name, True, check())
-        except ModuleNotFoundError as error:
-            yield Finding(name, name == "films", str(error), "" if name == "films" else remedy, note=name == "films")
         except Exception as error:
-            cause = textwrap.shorten(str(error) or type(error).__name__, 200, placeholder=" [...]")
-            yield Finding(name, False, cause, remedy)
+            absent = name == "films" and isinstance(error, ModuleNotFoundError)
+            yield Finding(name, absent, str(error) or repr(error), absent, remedy)
 
 
 def versions() -> str:
-    """Check that the versions of Python and all packages are within the bounds that hexmj requires."""
-    from packaging.requirements import Requirement
-    from packaging.specifiers import SpecifierSet
+    """Return the versions of hexmj, Python and the main packages."""
+    from hexmj.io import versions
 
-    needed = [Requirement(line) for line in requires("hexmj") or []]
-    needed = [package for package in needed if not package.marker or package.marker.evaluate({"extra": ""})]
-    bounds = {"python": SpecifierSet(metadata("hexmj")["Requires-Python"])}
-    bounds |= {package.name: package.specifier for package in needed}
-    found = {name: platform.python_version() if name == "python" else version(name) for name in bounds}
-    if wrong := [name for name in bounds if not bounds[name].contains(found[name], prereleases=True)]:
-        raise RuntimeError("; ".join(f"{name} {found[name]}, expected {bounds[name]}" for name in wrong))
-    return f"Python {found['python']}, mujoco {found['mujoco']} and {len(found) - 2} more packages within their bounds"
-
-
-def threads() -> str:
-    """Check that a container's quota of processor time is large enough for one thread per core."""
-    from hexmj.threads import cores
-
-    quota = Path("/sys/fs/cgroup/cpu.max")
-    share, period = quota.read_text().split() if quota.is_file() else ("max", "1")
-    if share != "max" and int(share) < cores() * int(period):
-        raise RuntimeError(f"{cores()} threads, but the container's quota is {int(share) / int(period):g} cores")
-    return f"{cores()} threads, one for each core that this process may use (of {os.cpu_count()})"
+    return ", ".join(f"{name} {number}" for name, number in versions().items())
 
 
 def rendering() -> str:
@@ -145,7 +116,6 @@ def walking() -> str:
 
 CHECKS: dict[str, tuple[Callable[[], str], str]] = {
     "versions": (versions, "Install hexmj into a fresh environment with Python 3.11 or newer."),
-    "threads": (threads, "Pass the number of granted cores with --threads."),
     "rendering": (rendering, "Install libegl1 libgl1-mesa-dri libopengl0 and set MUJOCO_GL=egl; only films need it."),
     "films": (films, "Reinstall imageio-ffmpeg and mediapy, or set IMAGEIO_FFMPEG_EXE; only films need it."),
     "compiled code": (compiled, "Unset NUMBA_DISABLE_JIT, and set NUMBA_CACHE_DIR to a writable folder."),
