@@ -3,7 +3,6 @@
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
-from enum import Enum
 from pathlib import Path
 from types import FunctionType, MethodType
 from typing import Any
@@ -23,15 +22,13 @@ def plain(value: Any, visit: Visit = lambda definition: None) -> Any:
     If a path, or a text with a dot, is an existing file, it becomes the file's name and a digest of its content.
 
     Args:
-        value: a number, text, path, array, dataclass, enumeration, class, function, or a list or dict of these.
+        value: a number, text, path, array, dataclass, class, function, or a list or dict of these.
         visit: function that is called with every class and function in the value.
 
     Raises:
         InputError: the value, or a part of it, has another type.
     """
     match value:
-        case Enum():
-            return {"class": _label(type(value), visit), "member": value.name}
         case None | bool() | int() | float():
             return value.item() if isinstance(value, np.generic) else value
         case np.ndarray() | np.generic():

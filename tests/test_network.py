@@ -14,7 +14,7 @@ import plain_network as plain
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED, Cruse1998, ModelVariant, Weights, kernel
 from hexmj.controllers.cruse1998 import network as network_module
 from hexmj.controllers.cruse1998.kernel import LANES
-from hexmj.controllers.cruse1998.weights import general
+from hexmj.controllers.cruse1998.weights import PLACES, general
 from hexmj.errors import InputError
 from hexmj.legs import CENTRED, FIG1, LEGS, MIRROR, Geometry
 from hexmj.measures.kinematic import first_loss, walk
@@ -42,7 +42,7 @@ def random_weights(rng: np.random.Generator) -> Weights:
     vector[10:14] = rng.integers(0, 2, 4)
     vector[24:44] *= rng.choice([0.02, 1.0], 20)
     vector[54:58] = rng.integers(0, 2, 4)
-    return Weights.from_vector(vector)
+    return Weights.of(dict(zip(PLACES.values(), vector, strict=True)))
 
 
 def random_starts(rng: np.random.Generator, size: int) -> np.ndarray:

@@ -18,14 +18,9 @@ LDVS = hexmj.LDVS
 
 MINE = """
 from dataclasses import dataclass
-from enum import Enum
 from typing import Literal
 import hexmj
 from hexmj.controllers import Step, stepwise
-
-class Side(Enum):
-    LEFT = 1
-    RIGHT = 2
 
 @dataclass(frozen=True)
 class Still:
@@ -35,7 +30,6 @@ class Still:
     fast: bool = False
     gait: Literal["tripod", "wave"] = "tripod"
     lags: tuple[float, ...] = (0.0,)
-    side: Side = Side.LEFT
     limit: float | None = None
     weights: hexmj.Symmetric = hexmj.Symmetric(p2=1.0)
 
@@ -101,7 +95,6 @@ def from_fields(text: str) -> dict[str, Any]:
         ("fast", "fast = true", True),
         ("gait", 'gait = "wave"', "wave"),
         ("lags", "lags = [0.0, 0.5]", [0.0, 0.5]),
-        ("side", 'side = "RIGHT"', "RIGHT"),
         ("limit", "limit = 1.0", 1.0),
     ],
 )
@@ -121,7 +114,6 @@ def test_a_table_changes_some_fields_of_a_nested_dataclass(mine):
         ("height", 'height = "4.0"'),
         ("fast", "fast = 1"),
         ("int", "lags = 3"),
-        ("MIDDLE", 'side = "MIDDLE"'),
         ("width", "width = 4.0"),
     ],
 )

@@ -182,9 +182,7 @@ def settings_of(controller: Controller) -> dict[str, Any]:
 
 
 def _without_classes(value: Any) -> Any:
-    """Return plain settings without class names; a member of an enumeration becomes the member's name."""
+    """Return plain settings without class names."""
     if isinstance(value, dict):
-        if value.keys() == {"class", "member"}:
-            return value["member"]
         return {key: _without_classes(item) for key, item in value.items() if key != "class"}
     return [_without_classes(item) for item in value] if isinstance(value, list) else value

@@ -5,7 +5,6 @@ import sys
 from collections.abc import Iterator
 from dataclasses import is_dataclass, replace
 from difflib import get_close_matches
-from enum import Enum
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -142,13 +141,11 @@ def _from_table(path: Path, table: dict[str, Any]) -> Controller:
 def _changed(default: Any, values: dict[str, Any]) -> Any:
     """Return the dataclass `default` with the values of a TOML table, each converted to the type of the default.
 
-    The table gives a member of an enumeration by its name, a tuple as a list, a dataclass as a table of its fields.
+    The table gives a tuple as a list, and a dataclass as a table of its fields.
     """
     changes = {}
     for name, value in values.items():
         match getattr(default, name, None):
-            case Enum() as old:
-                changes[name] = type(old)[value]
             case tuple() | Path() as old:
                 changes[name] = type(old)(value)
             case np.ndarray() as old:

@@ -180,8 +180,6 @@ class Walknet(Lifted):
     constants: Constants = CURVE
     rules: tuple[int, ...] = (1, 2, 3)
     """Rules that act, some of 1, 2, 3 and 5."""
-    veto: bool = False
-    """Whether no leg is lifted while three or more legs swing, as in `CURVE`; one step may lift several legs."""
 
     mirrored = True
 
@@ -214,10 +212,7 @@ class Walknet(Lifted):
         age = np.where(legs.stands, state + dt, -dt)  # time in stance: 0 at the step of touchdown
         shift = sum((self.shift(rule, legs, age) for rule in self.rules), np.zeros(legs.x.shape))
         pep = np.minimum(legs.stride.pep0 + span * shift, legs.stride.aep0 - span * self.constants.least_step)
-        lifted = legs.stands & (legs.x < pep)
-        if self.veto:
-            lifted &= (~legs.stands).sum(axis=1, keepdims=True) < 3
-        return age, lifted
+        return age, legs.stands & (legs.x < pep)
 
     def shift(self, rule: int, legs: Legs, age: np.ndarray) -> np.ndarray:
         """Return the shift of each leg's PEP by a rule, (start, leg) [step lengths]; `age` is the time in stance."""

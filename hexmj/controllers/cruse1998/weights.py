@@ -5,7 +5,7 @@ P^{3,1} ... P^{3,4}; the suffix ``_i`` means ipsilateral, ``_c`` contralateral.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 
@@ -74,20 +74,8 @@ class Weights:
             matrices[kind][pair] = number(f"{kind} {pair}", value)
         return cls(**matrices)
 
-    @classmethod
-    def from_vector(cls, vector: Sequence[float] | np.ndarray) -> "Weights":
-        """Return weights from 58 numbers in the order of `PLACES`.
-
-        Raises:
-            InputError: the vector does not have 58 numbers, or a weight is invalid.
-        """
-        values = numbers("weights", vector).ravel()
-        if values.size != len(PLACES):
-            raise InputError(f"vector has {values.size} weights; expected {len(PLACES)}")
-        return cls.of(dict(zip(PLACES.values(), values, strict=True)))
-
     def to_vector(self) -> np.ndarray:
-        """Return the 58 weights in the order of `PLACES`; the inverse of `from_vector`."""
+        """Return the 58 weights in the order of `PLACES`."""
         return np.array([getattr(self, kind)[pair] for kind, pair in PLACES.values()])
 
 
