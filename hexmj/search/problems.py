@@ -96,14 +96,6 @@ class Problem:
         controller = self.form.controller(vector)
         return SensoryFeedback(controller) if self.feedback else controller
 
-    def refusal(self, vector: np.ndarray) -> str:
-        """Return the error that a controller raises for the parameters of a candidate, (parameter,), else ''."""
-        try:
-            self.controller(vector)
-        except ValueError as error:
-            return f"{type(error).__name__}: {error}"
-        return ""
-
     @property
     def minimised(self) -> str:
         """Description of the cost."""
@@ -175,10 +167,12 @@ class Sample:
 
     def _cost(self, vector: np.ndarray, threads: int | None) -> float:
         """Return the FLSS; with ties 'later', the mean part of the time after a loss counts as one more start."""
-        if self.problem.refusal(vector):
+        try:
+            controller = self.problem.controller(vector)
+        except ValueError:
             return REFUSED
         try:
-            times, (ends,) = self._times(self.problem.controller(vector), [self.problem.observation_time], threads)
+            times, (ends,) = self._times(controller, [self.problem.observation_time], threads)
         except (OutOfReach, Refused, SimulationError):
             return REFUSED
         lost = (times <= ends).sum().item()

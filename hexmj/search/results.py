@@ -63,7 +63,6 @@ class Result:
             "minimised": self.problem.minimised,
             "lost": found.lost,
             "starts": found.starts,
-            "refused": len(found.refused),
             "verdict": {name: {time: judged.loc[name, time].to_dict() for time in times} for name in names},
             "settings": self.settings,
         }

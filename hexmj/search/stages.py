@@ -12,7 +12,7 @@ import numpy as np
 
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import load_controller
-from hexmj.errors import InputError, without_extra
+from hexmj.errors import without_extra
 from hexmj.plain import plain
 from hexmj.progress import Progress, shown
 from hexmj.search.algorithms import CovarianceAdaptation, Evolution, refine, search_population
@@ -96,20 +96,15 @@ class Found:
     """All candidates and their costs, see the function `history`."""
     replayed: int
     """Number of distinct candidates whose costs were read from the cache of an earlier run."""
-    refused: list[str]
-    """Error messages of the candidates whose parameters the controller rejects. Candidates that cannot walk, whose tip
-    targets are out of reach or whose simulation fails cost 1 too, but are not listed."""
 
     def report(self, problem: Problem) -> list[str]:
-        """Return lines for printing: evaluations, lowest cost, and candidates that cost 1 or were refused."""
+        """Return lines for printing: evaluations, lowest cost, and candidates that cost 1."""
         least = f"lowest cost {self.cost:.4g}"
         if problem.ties == "later":
             least += f" ({problem.minimised}" + (f"; {self.lost} of {self.starts} starts lost)" if self.lost else ")")
         lines = [f"{len(self.history.cost)} evaluations, {self.replayed} candidates from the cache; {least}"]
         if lost := int((self.history.cost.values >= REFUSED).sum()):
             lines.append(f"{lost} evaluations cost 1: all starts lost stability, or the candidate cannot walk")
-        if self.refused:
-            lines.append(f"{len(self.refused)} candidates were refused; the first error: {self.refused[0]}")
         return lines
 
 
@@ -171,16 +166,13 @@ def search(
         if advance:
             advance(1.0 - done)
     course = history(evaluated, problem.form.names, problem.minimised)
-    refused = list(filter(None, map(problem.refusal, course.candidate.values)))
-    if reason := problem.refusal(best):
-        raise InputError(f"{len(refused)} of {len(course.cost)} candidates were refused, including the best: {reason}")
     last = list(samples.values())[-1]
     if cost >= REFUSED:
         last.check_walks(best, threads)
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
-    course = course.assign_attrs(settings=settings, refused=len(refused))
+    course = course.assign_attrs(settings=settings)
     replayed = sum(values.replayed for values in cached.values())
-    return Found(best, cost, last.lost(cost), last.n_starts, course, replayed, refused)
+    return Found(best, cost, last.lost(cost), last.n_starts, course, replayed)
 
 
 Evaluated = tuple[str, np.ndarray, np.ndarray]
