@@ -70,12 +70,10 @@ def gait(walk: Walk) -> Gait:
     A leg that is raised in the first step has no onset in that step, since the state before it is unknown.
 
     Raises:
-        InputError: the walk has fewer than two steps, or no starts.
+        InputError: the walk has fewer than two steps.
     """
     if len(walk.time) < 2:
         raise InputError(f"the walk has {len(walk.time)} steps; expected at least {CYCLES} periods of every leg")
-    if not walk.stance.shape[1]:
-        raise InputError("the walk has 0 starts; expected at least 1")
 
     def upright(steps: int) -> np.ndarray:
         return walk_margin(part_of(walk, slice(-steps, None))) > 0

@@ -6,7 +6,6 @@ The authors may have used any variant, so that the best weight sets have a low F
 from dataclasses import MISSING, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
-from hexmj.errors import InputError
 from hexmj.legs import CENTRED
 from hexmj.validate import choice
 
@@ -58,7 +57,4 @@ def varied(part: Part, variant: str) -> Part:
             changes[name] = values[name] if value != values[name] else default
         elif is_dataclass(value) and (inner := varied(value, variant)) is not value:
             changes[name] = inner
-    try:
-        return replace(own, **changes) if changes else part
-    except InputError as error:
-        raise InputError(f"variant {variant}: {error}") from None
+    return replace(own, **changes) if changes else part

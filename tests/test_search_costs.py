@@ -75,8 +75,6 @@ def test_ties_are_broken_by_later_losses_and_nothing_else_is():
     assert len(set(flss)) > 3
     assert ((costs >= 0) & (costs <= 1)).all()
     assert (costs[np.lexsort((part, flss))] == np.sort(costs)).all()
-    for sample, known in ((plain, flss), (later, costs)):
-        assert [sample.lost(cost) for cost in known] == np.rint(n * flss).tolist()
 
 
 @pytest.mark.slow
@@ -93,7 +91,7 @@ def test_a_cost_is_called_what_it_is(ties: Any, over: Any, said: str):
     problem = Problem(NetworkForm("hws"), 0.4, 0.4, 10.0, ties=ties, over=over)
     found = search(problem, Effort(starts=4, budget=10, refine_starts=6, refine_budget=2))
     assert found.history.cost.attrs["long_name"] == said
-    assert found.starts == 6 and (found.lost is None) == (over == "mean")
+    assert found.starts == 6
     figure = convergence_figure(found.history.assign_attrs(title="title"))
     label, below = figure.axes[0].get_ylabel(), figure.legends[0].get_title().get_text()
     assert label.startswith("FLSS on") == (said == "FLSS")

@@ -1,6 +1,5 @@
 """Forms of the network and fields of a controller; candidates that are refused or fail are never found."""
 
-import math
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -132,12 +131,6 @@ def test_what_no_leg_reaches_is_never_found():
     problem = Problem(FieldsForm(Far()), 0.3, 0.3, observation_time=5.0, conditions=hexmj.Conditions())
     with pytest.raises(InputError, match="out of reach"):
         search(problem, Effort(starts=2, budget=10, refine_budget=0, domain=2.0))
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_boxes_that_are_not_finite_are_refused(value: float):
-    with pytest.raises(InputError, match="box"):
-        FieldsForm(Pace(good=value))
 
 
 def test_controllers_without_such_parameters_are_refused():

@@ -45,7 +45,7 @@ def test_a_controller_with_feedback_is_varied_within():
 def test_unknown_variants_and_impossible_values_are_errors():
     with pytest.raises(InputError, match="variant"):
         varied(LDVS, "nothing")
-    with pytest.raises(InputError, match="AEP0 9"):
+    with pytest.raises(InputError, match="pep0"):
         varied(Stride(aep0=20.0, pep0=9.5), "AEP0 9")
 
 

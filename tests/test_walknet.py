@@ -135,13 +135,6 @@ def test_no_step_is_shorter_than_the_least() -> None:
         assert found.x[:-1][lifted].max() < stride.aep0 - 20 * constants.least_step
 
 
-def test_the_veto_lifts_no_leg_while_three_swing() -> None:
-    found = walk(hexmj.draw_starts(20, 2), Walknet(veto=True), 0.8, 200.0)
-    forced = (found.x[:-1] - 0.08 < Stride().pep_min).any(axis=2)
-    swings = (~found.stance).sum(axis=2)
-    assert (np.diff(swings, axis=0)[(swings[:-1] >= 4) & ~forced] <= 0).all()
-
-
 def test_a_rule_is_left_out_by_name_and_others_are_refused() -> None:
     one = Walknet().without(2)
     assert (one.name, one.rules) == ("walknet-without-2", (1, 3))

@@ -109,11 +109,11 @@ def check_home(compiled: CompiledBody) -> None:
             f"; expected {expected[leg].tolist()} mm: the origin of the foot's line, one standing height below the root"
         )
     ahead, left, _ = _centre_of_mass(plain_model(body), body)
-    where = f"body {body.name!r}: in posture {body.home!r} the centre of mass is"
-    if compiled.conditions.centre_of_mass == 0.0 and abs(ahead) > tolerance:
-        raise InputError(f"{where} {ahead:.4g} mm ahead of O; expected 0, or Conditions(centre_of_mass={ahead:.4g})")
-    if abs(left) > tolerance:
-        raise InputError(f"{where} {left:.4g} mm left of O; expected 0")
+    if abs(left) > tolerance or (compiled.conditions.centre_of_mass == 0.0 and abs(ahead) > tolerance):
+        raise InputError(
+            f"body {body.name!r}: in posture {body.home!r} the centre of mass is {ahead:.4g} mm ahead and {left:.4g} mm"
+            f" left of O; expected O, or Conditions(centre_of_mass={ahead:.4g})"
+        )
 
 
 @lru_cache(maxsize=16)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 from hexmj.cli.command import Command
 from hexmj.cli.options import Output
@@ -39,7 +38,7 @@ class Finding(conformance.Finding):
 
 
 class Doctor(Command):
-    """List the versions of packages, and check rendering, films, compiled code and a short walk. A failed check names
+    """List the versions of packages, and check rendering, films and a short walk. A failed check names
     a remedy, and the exit code is then 1."""
 
     sources = (Output,)
@@ -86,18 +85,6 @@ def films() -> str:
     return f"two frames through {Path(imageio_ffmpeg.get_ffmpeg_exe()).name}"
 
 
-def compiled() -> str:
-    """Check that numba compiles code and can write its cache."""
-    from hexmj.controllers.cruse1998 import kernel
-
-    record: Any = kernel.record
-    if not hasattr(record, "stats"):
-        raise RuntimeError("NUMBA_DISABLE_JIT is set, so numba does not compile")
-    folder = record.stats.cache_path
-    with tempfile.TemporaryFile(dir=folder):
-        return f"cached in {folder}"
-
-
 def walking() -> str:
     """Check that two insects walk without a fall, and that one thread and all threads compute the same bits."""
     import numpy as np
@@ -118,8 +105,7 @@ CHECKS: dict[str, tuple[Callable[[], str], str]] = {
     "versions": (versions, "Install hexmj into a fresh environment with Python 3.11 or newer."),
     "rendering": (rendering, "Install libegl1 libgl1-mesa-dri libopengl0 and set MUJOCO_GL=egl; only films need it."),
     "films": (films, "Reinstall imageio-ffmpeg and mediapy, or set IMAGEIO_FFMPEG_EXE; only films need it."),
-    "compiled code": (compiled, "Unset NUMBA_DISABLE_JIT, and set NUMBA_CACHE_DIR to a writable folder."),
-    "walking": (walking, "Apply the other remedies, or reinstall mujoco and numba."),
+    "walking": (walking, "Set NUMBA_CACHE_DIR to a writable folder, or reinstall mujoco and numba."),
 }
 """Name of a check -> its function, and the remedy for its failure."""
 
@@ -133,8 +119,6 @@ class RerunOptions:
     read from the current directory."""
     threads: int | None = None
     """Number of threads of the repeated command; results do not depend on it."""
-    processes: int | None = None
-    """Number of processes of the repeated command, if it has this option; results do not depend on it."""
 
 
 class Rerun(Command):
@@ -156,11 +140,10 @@ class Rerun(Command):
         names = [name for name in then["files"] if name.endswith(".nc")]
         if not names:
             raise InputError(f"{found[0]} lists no NetCDF file; only NetCDF files can be compared")
-        options = {"--threads": given.threads, "--processes": given.processes}
-        words = [word for name, value in options.items() if value is not None for word in (name, str(value))]
+        words = [] if given.threads is None else ["--threads", str(given.threads)]
         with tempfile.TemporaryDirectory(prefix="hexmj-rerun-") as folder:
             with redirect_stdout(StringIO()):
-                run([*_without_output(then["command"]), *words, "--out", folder])
+                run([*then["command"], *words, "--out", folder])
             files = {name: _difference(found[0].parent / name, Path(folder) / name) for name in names}
             now = read_manifest(Path(folder) / found[0].name)
         pairs = {name: [then["versions"].get(name), version] for name, version in now["versions"].items()}
@@ -173,13 +156,6 @@ class Rerun(Command):
             show(*(f"{name}: {text or 'all bits are equal'}" for name, text in files.items()))
             show(*(f"version of {name}: {old} in the manifest, {new} now" for name, (old, new) in versions.items()))
         sys.exit(0 if equal else 1)
-
-
-def _without_output(words: list[str]) -> list[str]:
-    """Return a command line without --json and --out."""
-    kept = [word for word in words if word != "--json" and not word.startswith("--out=")]
-    at = kept.index("--out") if "--out" in kept else len(kept)
-    return [*kept[:at], *kept[at + 2 :]]
 
 
 def _difference(then: Path, now: Path) -> str:

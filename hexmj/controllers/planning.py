@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexmj.controllers.protocol import Controller, Plan, SteerablePlan, check_controller_type, check_steerable
+from hexmj.controllers.protocol import Controller, Plan, check_controller_type, check_steerable
 from hexmj.errors import InputError, Refused
 from hexmj.legs import LEGS
 from hexmj.stability import walk_margin
@@ -60,8 +60,6 @@ def begin(
             raise
         raise Refused(*error.args) from error
     check_plan(plan, x, stride)
-    if at_speed and not isinstance(plan, SteerablePlan):
-        raise InputError(f"begin_at_speed of {controller.name} returned {short(plan)}; expected a SteerablePlan")
     return plan
 
 

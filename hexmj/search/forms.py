@@ -49,8 +49,6 @@ class FieldsForm:
         check_controller_type(self.usual)
         if not self.names:
             raise InputError(f"{self.usual.name} has no fields of type float, which a search needs")
-        if not np.isfinite(self.begin).all():
-            raise InputError(f"{self.usual.name} has an infinite or NaN field; the search box needs finite values")
         if not self.name:
             kind = type(self.usual)
             object.__setattr__(self, "name", f"{kind.__module__}:{kind.__qualname__}")
@@ -123,10 +121,8 @@ class NetworkForm:
         """(parameter,) whether a parameter is binary: True for P^2 and P^4."""
         return np.array([name.startswith(BINARY) for name in self.names])
 
-    @property
-    def begin(self) -> None:
-        """None: by default each algorithm begins with its own vector, see `Effort.begin`."""
-        return None
+    begin = None
+    """By default each algorithm begins with its own vector, see `Effort.begin`."""
 
     def box(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the smallest and largest values of the initial population, (parameter,) each.

@@ -180,14 +180,6 @@ class Sample:
             return lost / self.n_starts
         return (lost + np.mean(1.0 - np.minimum(times / ends, 1.0)).item()) / (self.n_starts + 1)
 
-    def lost(self, cost: float) -> int | None:
-        """Return how many starts were lost, or fell, given a candidate's cost; None if it is a mean over variants."""
-        if self.problem.over == "mean":
-            return None
-        if self.problem.ties == "equal":
-            return round(cost * self.n_starts)
-        return min(int(cost * (self.n_starts + 1) + 1e-9), self.n_starts)  # the time lost adds less than one start
-
     def check_walks(self, vector: np.ndarray, threads: int | None = None) -> None:
         """Raise InputError or SimulationError if a candidate, (parameter,), cannot walk; return None otherwise."""
         self.settle(threads)

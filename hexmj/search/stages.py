@@ -88,8 +88,6 @@ class Found:
     """(parameter,) candidate with the lowest cost in the last stage."""
     cost: float
     """Cost of `vector` on the starts of the last stage, see `Problem.minimised`."""
-    lost: int | None
-    """Number of starts of the last stage that are lost, or fall, with `vector`; None for a mean over variants."""
     starts: int
     """Number of starts of the last stage."""
     history: "xr.Dataset"
@@ -99,9 +97,7 @@ class Found:
 
     def report(self, problem: Problem) -> list[str]:
         """Return lines for printing: evaluations, lowest cost, and candidates that cost 1."""
-        least = f"lowest cost {self.cost:.4g}"
-        if problem.ties == "later":
-            least += f" ({problem.minimised}" + (f"; {self.lost} of {self.starts} starts lost)" if self.lost else ")")
+        least = f"lowest cost {self.cost:.4g}" + (f" ({problem.minimised})" if problem.ties == "later" else "")
         lines = [f"{len(self.history.cost)} evaluations, {self.replayed} candidates from the cache; {least}"]
         if lost := int((self.history.cost.values >= REFUSED).sum()):
             lines.append(f"{lost} evaluations cost 1: all starts lost stability, or the candidate cannot walk")
@@ -172,7 +168,7 @@ def search(
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
     course = course.assign_attrs(settings=settings)
     replayed = sum(values.replayed for values in cached.values())
-    return Found(best, cost, last.lost(cost), last.n_starts, course, replayed)
+    return Found(best, cost, last.n_starts, course, replayed)
 
 
 Evaluated = tuple[str, np.ndarray, np.ndarray]

@@ -16,9 +16,6 @@ from hexmj.starts import checked_starts, checked_velocities
 from hexmj.timing import AT_SPEED, Stride, commanded_velocities
 from hexmj.validate import choice, number
 
-MOST = 1.7e308
-"""Maximum magnitude of a field of the type float."""
-
 
 @dataclass(frozen=True, eq=False)
 class Legs:
@@ -122,7 +119,7 @@ class Lifted:
         """Validate the fields of the dataclass that are floats or `Literal`s."""
         for name, kind in get_type_hints(type(self)).items():
             if kind is float:
-                object.__setattr__(self, name, number(name, getattr(self, name), -MOST, MOST))
+                object.__setattr__(self, name, number(name, getattr(self, name)))
             elif get_origin(kind) is Literal:
                 choice(name, getattr(self, name), get_args(kind))
 
