@@ -27,7 +27,7 @@ from hexmj.bodies.ground import lay_ground
 from hexmj.bodies.kinematics import joint_numbers, posed
 from hexmj.bodies.validation import check
 from hexmj.body import Body
-from hexmj.conditions import ROUNDING, Conditions
+from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 
@@ -47,15 +47,12 @@ def compile_body(
         pushes: whether to add sensors of the feet's forces; without them it walks faster, to the same bits.
 
     Raises:
-        InputError: the time step is out of range, or the MJCF does not fit the description of the body.
+        InputError: the MJCF does not fit the description of the body.
     """
     body = conditions.body
-    timestep = body.longest_step if timestep is None else timestep
-    if not 0 < timestep <= body.longest_step * (1.0 + ROUNDING):
-        raise InputError(f"timestep = {timestep} s; expected above 0 and at most {body.longest_step} s")
     compiled = _compiled(conditions, looks, pushes, body.mjcf.read_bytes())
     model = copy.copy(compiled.model)
-    model.opt.timestep = timestep
+    model.opt.timestep = timestep or body.longest_step
     return replace(compiled, model=model)
 
 
