@@ -182,12 +182,6 @@ class Body:
         if len(set(numbers)) > 1 or numbers[0] < FEWEST_JOINTS:
             has, least = ", ".join(map(str, numbers)), FEWEST_JOINTS
             yield f"numbers of joints of the legs: {has}; expected the same number for all, at least {least}"
-        parts = tuple(part for leg in self.legs for part in leg.parts)
-        yield from (f"trunk part {name!r} is also in a leg; expected it once" for name in self.trunk if name in parts)
-        named = {"joints": self.joints, "feet": self.feet, "trunk": self.trunk, "parts of legs": parts}
-        for kind, names in named.items():
-            twice = (name for i, name in enumerate(names) if name in names[:i])
-            yield from (f"{kind}: the name {name!r} occurs twice; expected it once" for name in twice)
 
     @property
     def joints(self) -> tuple[str, ...]:
