@@ -100,6 +100,9 @@ def run_search(
     if effort.verdict_seed in {effort.seed, *earlier}:
         used = f"{sorted({effort.seed, *earlier})}, the seeds of this search and of earlier ones"
         raise InputError(f"verdict_seed = {effort.verdict_seed}; expected a seed other than {used}")
+    begins = [Path(name).resolve() for name in (effort.begin, problem.form.name) if isinstance(name, str)]
+    if (Path(out) / FOUND).resolve() in begins:
+        raise InputError(f"out = {out}: the search begins with its {FOUND}; expected another directory")
     problem.domain(effort.domain, effort.beginning)  # raises InputError before a directory is made
     controllers, vectors = _compared(problem)
     judges = Sample(problem, effort.verdict_starts or 0, effort.verdict_seed)
