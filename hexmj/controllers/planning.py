@@ -19,9 +19,6 @@ from hexmj.walks import PLANNED, PlannedWalk, copied
 STEP_MEMORY = 400
 """Memory for planning one step of one start [bytes]."""
 
-REPEATED = 20
-"""Number of steps in which `check_repeats` compares two plans: two time units with the default time step."""
-
 HELD = 400_000
 """Maximum number of steps times starts of a plan that `planned_losses` holds in memory."""
 
@@ -107,23 +104,6 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
     if walk.geometry != plan.stride.geometry:
         raise InputError(f"the plan's geometry is {walk.geometry}; expected {plan.stride.geometry}")
     return walk
-
-
-def check_repeats(
-    controller: Controller,
-    starts: np.ndarray,
-    velocity: ArrayLike,
-    steps: int,
-    stride: Stride,
-    acceleration: Acceleration | None = None,
-) -> None:
-    """Raise InputError if two plans with the same arguments differ, as with random numbers without a seed.
-
-    Only the first `REPEATED` steps are compared. `starts` is (start, leg) [mm], `velocity` V_r, one number or (start,).
-    """
-    plans = [begin(controller, starts, velocity, stride, acceleration, threads=1) for _ in range(2)]
-    first, second = (advanced(plan, min(steps, REPEATED)) for plan in plans)
-    check_same(first, second, f"two plans of {controller.name}")
 
 
 def check_same(first: PlannedWalk, second: PlannedWalk, what: str, before: int = 0) -> None:

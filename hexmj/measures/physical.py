@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.planning import advanced, begin, check_repeats, check_same
+from hexmj.controllers.planning import advanced, begin, check_same
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
 from hexmj.measures.kinematic import first_loss
 from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar, WalkSoFar
@@ -156,7 +156,6 @@ def physical_outcomes(
         InputError, SimulationError: see `rollout.drive`.
     """
     starts, stride = settled.starts, settled.stride
-    check_repeats(controller, starts, velocity, int(steps_within(duration, stride)), stride, acceleration)
     plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
     walks: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     lost = first_loss(starts, controller, velocity, duration, **walks)

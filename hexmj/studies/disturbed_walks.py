@@ -11,7 +11,7 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.controllers.planning import REPEATED, advanced, begin, check_repeats, planned_losses
+from hexmj.controllers.planning import advanced, begin, planned_losses
 from hexmj.controllers.protocol import Controller, SteerableController, check_steerable
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import first_loss
@@ -169,9 +169,7 @@ class StableWalks:
     @cached_property
     def found(self) -> StableStarts:
         """The stable starts, found once for all cases."""
-        found = find_stable_starts(self.planner, self.velocity, self.n_starts, self.seed, self.stride, GRID)
-        check_repeats(self.planner, found.starts, self.velocity, REPEATED, self.stride)
-        return found
+        return find_stable_starts(self.planner, self.velocity, self.n_starts, self.seed, self.stride, GRID)
 
     @cached_property
     def postures(self) -> Postures:
