@@ -60,6 +60,7 @@ class Walk(Command):
 
     def run(self, given: SimpleNamespace) -> Answer:
         from hexmj.io import attributes, results_folder
+        from hexmj.measures.compare import REPORTED
         from hexmj.replay.recording import Start, recording_summary, save_recording
 
         if not given.physical:
@@ -71,6 +72,7 @@ class Walk(Command):
         files = [save_recording(walked, out / "recording.nc"), draw(walked, out / f"walk.{given.format}")]
         summary = recording_summary(walked)
         lines = [f"{key}: {_in_words(key, value)}" for key, value in summary.items() if value is not None]
+        lines += [f"{name}: {walked[name].attrs['long_name']}" for name in REPORTED if given.physical]
         result = walked.drop_vars(walked.variables).assign_attrs(attributes(settings))
         closing = [f"Next: hexmj {command} {files[0]}" for command in ("render", "page", "view")]
         closing += [] if given.physical else ["Or simulate this walk: add --physical"]

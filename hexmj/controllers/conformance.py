@@ -77,7 +77,7 @@ def findings(
             yield Finding(name, False, f"{wrong}; the later checks were left out")
             return
         yield Finding(name, wrong is None, wrong or law.__doc__ or "")
-    yield Finding("sliding", True, _sliding(trials), note=True)
+    yield _sliding(trials)
 
 
 def _trials(controller: Controller, velocities: np.ndarray, stride: Stride) -> Iterator[Trial]:
@@ -105,7 +105,7 @@ def _failure(law: Callable[[Trial], None], trial: Trial) -> str | None:
     return f"{'accelerating: ' if trial.acceleration else ''}{' '.join(found.split())}"
 
 
-def _sliding(trials: list[Trial]) -> str:
+def _sliding(trials: list[Trial]) -> Finding:
     """Describe how fast standing feet slide: the tip of a foot that stays in place on the ground recedes at V_r."""
     slides = []
     for walk, dt in ((trial.walk, trial.stride.dt) for trial in trials):
@@ -115,8 +115,9 @@ def _sliding(trials: list[Trial]) -> str:
         slides.append((speed.max(), place(walk, (step + 1, *others))))
     most, where = max(slides)
     if most <= 1e-6:
-        return "standing feet stay in place on the ground: their tips recede at V_r"
-    return (
+        return Finding("sliding", True, "standing feet stay in place on the ground: their tips recede at V_r")
+    found = (
         "standing feet would slide: the tip of a foot that stays in place recedes at V_r, but a tip differs from it by"
         f" {most:.2g} V_p, in {where}; in physical walks such feet scrape over the ground"
     )
+    return Finding("sliding", True, found, note=True)

@@ -61,9 +61,9 @@ def load_controller(name: str) -> Controller:
         table = read_toml(file)
         return _from_table(file, table) if "controller" in table else read_network(table, name, file.stem)
     names = [*known_names()]
-    hint = "".join(f" Did you mean {near}?" for near in get_close_matches(name, names, 1))
-    forms = "file.toml, file.py:object, module:object"
-    raise InputError(f"controller {name!r} does not exist.{hint} Expected {forms} or one of {', '.join(names)}")
+    expected = f"Expected file.toml, file.py:object, module:object or one of {', '.join(names)}"
+    hints = [f"Did you mean {near}?" for near in get_close_matches(name.lower(), names, 1)]
+    raise InputError(f"controller {name!r} does not exist. {(hints or [expected])[0]}")
 
 
 def known_names() -> Iterator[str]:

@@ -115,7 +115,7 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
     found = [f"{in_figure(name)} {where(result.velocity.values, row)}" for name, row in zip(names, more, strict=True)]
     found = found if len(names) <= FEW else [f"in {more.sum()} of {more.size} cases"]
     exceeds = "exceeds the frequency of falls"
-    finding = f"clearly {exceeds}: {'; '.join(found)}" if more.any() else f"nowhere clearly {exceeds}"
+    finding = f"clearly {exceeds}: {'; '.join(found)}" if more.any() else f"at no velocity clearly {exceeds}"
     head(figure, f"the kinematic FLSS {finding}", caption(result), "bars: 95 % intervals")
     return figure
 

@@ -168,6 +168,7 @@ def walk_figure(recording: xr.Dataset) -> "Figure":
     if physical:
         measured = np.where(np.isfinite(recording.measured_margin), recording.measured_margin, np.nan)
         margin.plot(time, measured, color=orange, linewidth=1.2, label="measured: feet that carry load")
+        events["measured loss"] = float(recording.measured_loss_time)
         events["trunk on the ground"] = fall = float(recording.fall_time)
         if fall <= time[-1]:
             margin.axvline(fall, color=red, linewidth=1.6, linestyle="-.", label="fall: trunk on the ground")
