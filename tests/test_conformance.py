@@ -84,7 +84,7 @@ def test_one_cause_is_found_once(law):
 def test_sliding_feet_are_a_remark():
     walks = Own(), steps_changed(x=lambda walk: np.zeros(6), stance=lambda walk: True)
     (*_, still), (*_, slides) = (findings(controller) for controller in walks)
-    assert still.note and slides.note and still.well and slides.well
+    assert slides.note and not still.note and still.well and slides.well
     assert still.found != slides.found
 
 
@@ -97,9 +97,7 @@ def test_only_controllers_are_checked():
 def test_check_controller_says_what_is_wrong(run, tmp_path):
     code, out, _ = run("check-controller", "ldvs")
     assert code == 0
-    *laws, last = out.splitlines()
-    assert all(line.startswith("ok ") for line in laws)
-    assert last.startswith("note")
+    assert all(line.startswith("ok ") for line in out.splitlines())
     wrong = OWN.replace("return Step(x, stands)", "return Step(x * np.nan, stands)")
     (tmp_path / "mine.py").write_text(wrong)
     code, out, _ = run("check-controller", f"{tmp_path / 'mine.py'}:Waits", "--json")
