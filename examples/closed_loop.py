@@ -1,4 +1,4 @@
-"""Open against closed loop on the same starts: unloaded, and with a load of twice the insect's weight."""
+"""Compare LDVS without and with sensory feedback: unloaded, and with a load of twice the insect's weight."""
 
 import numpy as np
 

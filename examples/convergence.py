@@ -1,4 +1,4 @@
-"""As V_p goes to zero the insect follows its plan: the same starts, with usual and nearly massless legs."""
+"""As V_p goes to zero, the insect follows its plan: the same starts, with normal and nearly massless legs."""
 
 from pathlib import Path
 

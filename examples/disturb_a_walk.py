@@ -1,4 +1,4 @@
-"""Halt an insect in mid-stride: it continues from there, or reorganises its legs first."""
+"""Halt an insect in mid-stride. The walk restarts from this posture, or the legs first move to another posture."""
 
 import numpy as np
 

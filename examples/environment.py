@@ -1,4 +1,4 @@
-"""The insect as a dm_env environment: one episode of the controller's walk, without offsets."""
+"""The insect as a dm_env environment: the controller walks one episode, and every action is zero."""
 
 import numpy as np
 

@@ -1,6 +1,6 @@
-"""The documentation's gallery: short films of walks, as animated WebP.
+"""Render the documentation's gallery: short films of walks, as animated WebP.
 
-They are written into `results/gallery`, or by `make gallery` into `docs/images`.
+The script writes the films into `results/gallery`; `make gallery` writes them into `docs/images`.
 """
 
 import subprocess

@@ -1,10 +1,10 @@
-"""Claims of the 1998 paper under all combinations of the rules that its text leaves open: which rules fit its numbers?
+"""Test claims of the 1998 paper under each combination of the rules that the paper leaves open.
 
     python examples/model_variants.py
     python examples/model_variants.py --starts 50 --gait-starts 4 --combinations 3
 
-Every combination walks the published weight sets. The claims are those from which no constant was inferred. The first
-combination is the printed one. A run that was stopped resumes if it is repeated.
+Every combination of rules walks the published weight sets. The script tests only claims from which no constant was
+inferred. The first combination is the one printed in the paper. Repeat the command to resume a stopped run.
 """
 
 from collections.abc import Sequence

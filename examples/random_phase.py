@@ -1,6 +1,6 @@
-"""Why Graham's clock leads the league: its first step lifts one tripod while the other carries the body.
+"""Why Graham's clock leads the league: its first step lifts one tripod while the other tripod carries the body.
 
-The same clock that begins at a random phase loses static stability and falls more often than LDVS.
+A Graham clock with a random initial phase loses static stability and falls more often than LDVS.
 """
 
 from dataclasses import dataclass

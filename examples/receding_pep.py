@@ -1,16 +1,16 @@
-"""A weight set for V = 0.1 by design: a PEP recedes before a neighbour's lift-off, and returns if it has to wait.
+"""A weight set designed for V = 0.1: a PEP recedes before a neighbour's lift-off, and returns if the neighbour waits.
 
-Most losses of other weight sets at V = 0.1 come from two neighbours that are lifted in the same step: influences act
-one step late. Mechanism 3 can prevent this. When a leg approaches its PEP, the PEP of the leg behind it recedes, four
-times as fast as legs retract, so that few legs cross their PEP at the time of the neighbour's lift-off. While the
-neighbour protracts, mechanism 3 is inactive and the PEP stays back by 4 mm, the cap of Eq. 4; the leg moves 2 mm.
+With other weight sets, most losses of stability at V = 0.1 occur when two neighbouring legs lift off in the same step,
+because influences act one step late. Mechanism 3 can prevent this: when a leg approaches its PEP, the PEP of the leg
+behind recedes, four times as fast as the legs retract. Few legs then cross their PEP when a neighbour lifts off. While
+the neighbour protracts, mechanism 3 is inactive. The PEP stays back by 4 mm (the cap of Eq. 4), and the leg moves 2 mm.
 
-A neighbour that has to wait is lifted late, and a leg that waits for it would use up its 4 mm. After 1 mm its PEP
-therefore returns at once, the leg is lifted, and the neighbour waits (mechanism 1). On 80,000 starts this weight set
-loses 0.0005; with PEPs that stay back, 0.0036, or 0.0019 at their best slope, 0.8.
+A neighbour that has to wait lifts off late, and the leg behind would use up its 4 mm. After 1 mm, the PEP of the leg
+behind therefore returns at once: this leg lifts off, and the neighbour waits (mechanism 1). On 80,000 starts, the
+FLSS of this weight set is 0.0005. With PEPs that stay back, the FLSS is 0.0036, or 0.0019 at the best slope, 0.8.
 
-Of two opposite legs only one PEP recedes. The numbers of the hind legs were chosen by hand, on other starts than those
-of seed 1998.
+In each pair of opposite legs, only one PEP recedes. The numbers of the hind legs were chosen by hand, on starts with
+seeds other than 1998.
 """
 
 from pathlib import Path

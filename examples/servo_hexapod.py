@@ -1,7 +1,7 @@
-"""A robot instead of the insect: a servo hexapod of 1.5 kg, whose steps are four times as long.
+"""A servo hexapod of 1.5 kg walks instead of the insect, with steps four times as long.
 
 Lengths, masses and ranges come from a public description of the PhantomX (HumaRobotics, BSD). The foot's radius, the
-feet's positions, servos and ground are ours.
+positions of the feet, the servos and the ground are assumptions of this example.
 """
 
 from dataclasses import asdict, dataclass, replace

@@ -1,8 +1,8 @@
-"""Reflexes learned by CMA-ES (`pip install ".[gym,search]"`): 15 weights that keep LDVS from falling at the beginning.
+"""Learn reflexes with CMA-ES (`pip install ".[gym,search]"`): 15 weights that prevent early falls of LDVS.
 
-In every generation all candidates walk the same fresh starts in one vector environment. `python examples/train_cma.py`
-takes some minutes and writes the weights into `reflexes.toml`; `hexmj league --controller
-examples/train_cma.py:REFLEXES ldvs` compares the result with other controllers.
+In each generation, all candidates walk the same new starts in one vector environment. `python examples/train_cma.py`
+takes some minutes and writes the weights into `reflexes.toml`. Compare the reflexes with other controllers:
+`hexmj league --controller examples/train_cma.py:REFLEXES ldvs`.
 """
 
 import time

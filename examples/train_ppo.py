@@ -1,8 +1,8 @@
-"""Reflexes that keep LDVS upright, learned by PPO of stable-baselines3 (`pip install ".[rl]"`).
+"""Learn reflexes that keep LDVS upright, with PPO of stable-baselines3 (`pip install ".[rl]"`).
 
-An action is four gains, the same in every leg, held for 10 time units; the reflexes act at every step. `python
-examples/train_ppo.py` writes the gains into `righting.json`. The controller walks without stable-baselines3: `hexmj
-league --controller examples/train_ppo.py:RIGHTING ldvs`.
+An action sets four gains, the same in every leg, for 10 time units. The reflexes act at every step.
+`python examples/train_ppo.py` writes the gains into `righting.json`. The learned controller does not need
+stable-baselines3: `hexmj league --controller examples/train_ppo.py:RIGHTING ldvs`.
 """
 
 import json

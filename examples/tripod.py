@@ -1,4 +1,4 @@
-"""Your own controller: a tripod of six phase oscillators that pull each other into antiphase."""
+"""Your own controller: six phase oscillators, coupled so that two tripods of legs alternate."""
 
 from dataclasses import dataclass
 

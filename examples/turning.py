@@ -1,4 +1,4 @@
-"""A controller that turns: its standing tips move on circles about a point beside the insect."""
+"""A controller that turns: the feet in stance move on circles about a point beside the insect."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,10 +1,10 @@
-"""FLSS of weight sets with one constant or rule changed at a time that the paper leaves open: which sets stay good?
+"""FLSS of weight sets with one change at a time to a constant or rule that the paper leaves open.
 
     python examples/variants.py
     python examples/variants.py --controllers ldvs own-V --velocities 0.3 0.5 --physical --n-starts 20
 
-A set named `own-V` stands for `own-0.3` at V = 0.3, and so on. A set that has a variant anyway gets the default of that
-constant or rule instead; its number has an asterisk.
+`own-V` stands for the weight set of each velocity, such as `own-0.3` at V = 0.3. If a weight set already has the
+changed value, it walks with the default value instead, and its FLSS has an asterisk.
 """
 
 from collections.abc import Sequence

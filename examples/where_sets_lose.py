@@ -1,4 +1,4 @@
-"""Where do weight sets lose static stability? The period and the posture of every first loss, within three periods."""
+"""Walks of three leg periods: when do weight sets first lose static stability, and which legs swing together then?"""
 
 import numpy as np
 
