@@ -49,7 +49,7 @@ def blocks(page: str) -> list[str]:
 def shared(tmp_path_factory):
     """One folder for all commands, because some read what an earlier one wrote."""
     folder = tmp_path_factory.mktemp("documents")
-    (folder / "mine.py").write_text((blocks("docs/howto/controller.md") or [""])[0])
+    (folder / "mine.py").write_text(blocks("docs/howto/controller.md")[0])
     shutil.copy(hexmj.STICK_INSECT.mjcf, folder / "beetle.xml")
     return folder
 

@@ -161,7 +161,8 @@ class StudyCommand(Command):
             files += self.write_more(given, result)
         manifest = self.manifest.format(**vars(given))
         closing = [] if folder else ["Nothing is saved; --out FOLDER saves the table, a figure and a manifest."]
-        return Answer(self.summary(result), self.shown(study, result), files, None, manifest, result, closing)
+        own = {"manifest": manifest, "result": result, "closing": closing}
+        return Answer(self.summary(result), self.shown(study, result), files, **own)
 
 
 def imported(place: str) -> Any:

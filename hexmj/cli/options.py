@@ -339,9 +339,9 @@ def _texts(*settings: type) -> dict[str, str]:
                 match statement, text:
                     case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
                         texts[NAMES.get(name, name)] = " ".join(words.split())
-    initial = "V_r at the beginning of a walk with --acceleration; by default 0.1."
-    acceleration = (
+    texts.setdefault("initial_velocity", "V_r at the beginning of a walk with --acceleration; by default 0.1.")
+    texts["acceleration"] = (
         "Acceleration a of Eq. 11 from --initial-velocity to --velocity [1 / time unit]; the paper's is 0.00008."
+        " By default, walks do not accelerate."
     )
-    acceleration += " By default, walks do not accelerate."
-    return {"initial_velocity": initial} | texts | {"acceleration": acceleration}
+    return texts

@@ -27,8 +27,8 @@ def show(*parts: Any) -> None:
 
     console = Console(highlight=False, soft_wrap=False, markup=False, emoji=False)
     for part in parts:
-        for one in [part] if isinstance(part, str) else part:
-            console.print(one if isinstance(one, str) else Padding(one, (1, 0), expand=False))
+        for item in [part] if isinstance(part, str) else part:
+            console.print(item if isinstance(item, str) else Padding(item, (1, 0), expand=False))
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]], repeated: int | None = 1) -> "Iterator[Table]":

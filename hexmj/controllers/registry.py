@@ -111,6 +111,8 @@ def _object(where: str, what: str, name: str) -> Controller:
 def _module(where: str) -> ModuleType:
     """Import a module or a .py file; the file's directory joins sys.path, so that worker processes import it too."""
     path = Path(where).absolute()
+    if path.suffix == ".py" and not path.is_file():
+        raise InputError(f"{where} does not exist")
     if path.suffix == ".py" and str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
     try:

@@ -29,7 +29,7 @@ UNITS: dict[str, str] = {
 SYMBOLS = {"vp": "$V_p$", "aep0": "AEP$_0$", "pep0": "PEP$_0$", "pep_min": "PEP_min"}
 """Field of `Conditions` or `Stride` -> its symbol in a caption, if that is not the field's name."""
 
-TIMES = {"walk": "three leg periods", "start": "two protractions"}
+TIMES = {"walk": "three leg periods", "start": "two swings"}
 """Named observation time -> its text in a caption."""
 
 FEW = 3

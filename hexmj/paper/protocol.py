@@ -14,7 +14,7 @@ from hexmj.sweep import Cell
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
 from hexmj.validate import whole
 
-FEW = 20
+OVERHEAD = 20
 """Number of starts whose steps take about as long as the overhead of a step."""
 
 FILE = 0.03
@@ -205,7 +205,7 @@ def cells(name: str, protocol: Protocol) -> dict[float, Cell]:
 
     def cell(v: float) -> Cell:
         own, full = (measurement.settings(v, each) for each in (protocol, FULL))
-        effort, most = ((each.get("n_starts", 1) + FEW) / each["stride"].dt for each in (own, full))
+        effort, most = ((each.get("n_starts", 1) + OVERHEAD) / each["stride"].dt for each in (own, full))
         settings = {"velocity": v, "seed": protocol.seed} | own
         return Cell(f"{name} {v:g}", measurement.function, settings, seconds * effort / most + FILE)
 

@@ -31,7 +31,7 @@ FINAL = 0.9
 KINEMATIC_COST = 0.015
 """Computing time of a time unit of a kinematic walk, as a fraction of that of a physical walk."""
 
-FEW = 4
+OVERHEAD = 4
 """Number of starts whose physical steps take about as long as the overhead of a step."""
 
 MOST_GAIT_STARTS = 50
@@ -115,7 +115,7 @@ class League(ControllerStudy):
 
         def cell(question: str, cost: float, method: str, changed: Mapping[str, Any], **own: Any) -> tuple[str, Cell]:
             own_walks = replace(walks, **changed)
-            work = float(cost * (own_walks.n_starts + FEW))  # estimated computing time, relative to other cells
+            work = float(cost * (own_walks.n_starts + OVERHEAD))  # estimated computing time, relative to other cells
             return question, Cell(f"{name} {question}", getattr(own_walks, method), own, work)
 
         for v, time in zip(*(axis.tolist() for axis in self.observed), strict=True):

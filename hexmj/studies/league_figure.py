@@ -1,7 +1,7 @@
 """Two figures of the league with a row for each entrant: losses and falls; and trials, gaits and costs."""
 
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,14 @@ POINTS = {"range": ("o", KINEMATIC, -0.14), "accelerated": ("D", "white", 0.14)}
 """FLSS that is not given per velocity -> marker, its fill, and vertical shift of its point in the entrant's row."""
 
 
-Panel = tuple[str, np.ndarray, str, np.ndarray | bool, dict[str, Any]]  # title, numbers, colours, walks missing, ends
+class Panel(NamedTuple):
+    """A heat map with a row for each entrant."""
+
+    title: str
+    values: np.ndarray  # (entrant, column), shown as colours
+    colours: str  # name of a colour map
+    fewer: np.ndarray | bool  # (entrant, column), whether walks are missing
+    ends: dict[str, Any]  # options of the colour scale
 
 
 def league_figure(result: "xr.Dataset") -> "Figure":
@@ -36,10 +43,10 @@ def league_figure(result: "xr.Dataset") -> "Figure":
     shown = by_rank(result)
     missing = shown.missing.values > 0
     titles = dict(zip(MEASURES, ("kinematic FLSS", "measured FLSS", "frequency of falls"), strict=True))
-    panels: list[Panel] = []
+    panels = []
     for name, title in titles.items():
         starts, fewer = starts_in_words(shown[f"{name}_starts"].max().item()), name != "kinematic" and missing
-        panels.append((f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer, SHARE))
+        panels.append(Panel(f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer, SHARE))
     first = shown.entrant.values[shown.best.sel(measure="physical").values == 1]
     finding = f"fewest falls over all velocities: {', '.join(first[:4])}" + " and others" * (len(first) > 4)
     figure, axes, images = _drawn(finding, shown, panels, in_figure(from_one(shown)))
@@ -54,11 +61,11 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
     few, missing = shown.fell_starts.values, shown.missing.values > 0
     some_are = (few > 0) & (few < few.max())
     trials = f"frequency of falls\nin trials, {starts_in_words(few.max())}"
-    panels: list[Panel] = [
-        (trials, shown.fell.values, "YlOrRd", some_are, SHARE),
-        ("steady-state gaits:\nshare that is stable", shown.stable.values, "YlGn", False, SHARE),
-        ("steady-state gaits: phase\nof legs on one side", shown.ipsilateral.values, "twilight", False, SHARE),
-        ("energy cost of transport\nof walks without a fall", shown.cost.values, "PuBu", missing, {}),
+    panels = [
+        Panel(trials, shown.fell.values, "YlOrRd", some_are, SHARE),
+        Panel("steady-state gaits:\nshare that is stable", shown.stable.values, "YlGn", False, SHARE),
+        Panel("steady-state gaits: phase\nof legs on one side", shown.ipsilateral.values, "twilight", False, SHARE),
+        Panel("energy cost of transport\nof walks without a fall", shown.cost.values, "PuBu", missing, {}),
     ]
     worst = shown.trial.values[np.nan_to_num(shown.fell.mean("entrant").values).argmax()]
     finding = f"the trial with most falls at V = {result.attrs['trial_velocity']:g} is '{worst}'"
