@@ -1,11 +1,8 @@
 """The command `hexmj reproduce`."""
 
-import re
-from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 from hexmj.cli.command import Answer, Command, at_work
 from hexmj.cli.options import Output, Workers, build
@@ -40,14 +37,5 @@ class Reproduce(Command):
         starts = f"The claims of the 1998 paper: FLSS of {p.samples} x {p.sample} starts at each velocity, gaits of"
         starts += f" {p.gait_starts} starts, walks after obstacles of {p.obstacle_starts} starts; seed {p.seed}"
         about = "walk, start: observation times; *: calibrates a constant of hexmj; claims.md: intervals and reasons"
-        lines = [starts, _short(*report.table()), about, *report.summary]
+        lines = [starts, table(*report.table(short=True), None), about, *report.summary]
         return Answer(report.json(), lines, report.files, settings)
-
-
-def _short(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Any:
-    """Return the table of claims for a screen: without intervals, places and reasons; * marks a calibrated claim."""
-    short = [
-        (section, text + "*" * (kind != "held out"), value, *(re.split(r" \(| at ", cell)[0] for cell in cells[:-2]))
-        for section, text, value, kind, *cells in rows
-    ]
-    return table(("section", "the paper", "value", *(name.removeprefix("ours, ") for name in heads[4:-2])), short, None)

@@ -58,11 +58,22 @@ class Row:
     @property
     def cells(self) -> tuple[str, ...]:
         """Texts of the row: claim, answers for all variants and observation times, `fits` and `why`."""
-        claim, cells = self.claim, []
-        for answers in (self.answers, *self.beside.values()):
-            cells += [*map(_cell, answers.values()), "same"][: len(OBSERVATION_TIMES)]
+        claim = self.claim
         kind = ": ".join(filter(None, (claim.kind, "; ".join(claim.calibrates))))
-        return claim.section, claim.text, claim.value, kind, *cells, self.fits, self.why
+        return claim.section, claim.text, claim.value, kind, *self._answered(), self.fits, self.why
+
+    @property
+    def short(self) -> tuple[str, ...]:
+        """Texts of a row for a screen: without intervals, places and reasons; * marks a calibrated claim."""
+        claim = self.claim
+        return claim.section, claim.text + "*" * bool(claim.calibrates), claim.value, *self._answered(short=True)
+
+    def _answered(self, short: bool = False) -> list[str]:
+        """Return the texts of the answers for all variants and observation times."""
+        cells = []
+        for answers in (self.answers, *self.beside.values()):
+            cells += [*(_cell(answer, short) for answer in answers.values()), "same"][: len(OBSERVATION_TIMES)]
+        return cells
 
 
 def verdict(answer: Answer | None) -> str:
@@ -70,13 +81,13 @@ def verdict(answer: Answer | None) -> str:
     return NOT_SEARCHED if answer is None else "agrees" if answer.agrees else "differs"
 
 
-def _cell(answer: Answer | None) -> str:
-    """Return the text of an answer: verdict, value, 95 % interval, and where."""
+def _cell(answer: Answer | None, short: bool) -> str:
+    """Return the text of an answer: verdict and value; unless it is short, also the 95 % interval and where."""
     if answer is None:
         return NOT_SEARCHED
-    interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high else ""
+    interval = f" ({answer.low:.4f} to {answer.high:.4f})" if answer.low < answer.high and not short else ""
     number = "no value" if answer.value != answer.value else f"{answer.value:.4f}{interval}"
-    return f"{verdict(answer)}: {number} at {answer.where}"
+    return f"{verdict(answer)}: {number}" + ("" if short else f" at {answer.where}")
 
 
 @dataclass(frozen=True)
@@ -87,12 +98,13 @@ class Report:
     protocol: Protocol
     files: list[Path] = field(default_factory=list)
 
-    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    def table(self, short: bool = False) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Return the column heads and the rows of the table of claims, with a column for each model variant."""
-        names = ("ours", *self.rows[0].beside)
-        answers = (f"{name}, {time}" for name in names for time in OBSERVATION_TIMES)
-        heads = "section", "the paper", "its value", "kind", *answers, "fits", "why"
-        return heads, [row.cells for row in self.rows]
+        answers = [f"{name}, {time}" for name in ("ours", *self.rows[0].beside) for time in OBSERVATION_TIMES]
+        if short:
+            heads = "section", "the paper", "value", *(name.removeprefix("ours, ") for name in answers)
+            return heads, [row.short for row in self.rows]
+        return ("section", "the paper", "its value", "kind", *answers, "fits", "why"), [row.cells for row in self.rows]
 
     @property
     def summary(self) -> list[str]:
