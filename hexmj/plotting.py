@@ -41,7 +41,7 @@ BESIDE = 0.024
 
 MEASURE_STYLES: dict[str, dict[str, Any]] = {
     "kinematic": {"color": "#1b6ca8", "marker": "o", "linestyle": "-", "label": "kinematic FLSS: planned feet"},
-    "measured": {"color": "#c8740a", "marker": "s", "linestyle": "--", "label": "measured FLSS: feet that carry load"},
+    "carried": {"color": "#c8740a", "marker": "s", "linestyle": "--", "label": "carried FLSS: feet that carry load"},
     "physical": {"color": "#b3261e", "marker": "^", "linestyle": "-.", "label": "frequency of falls: trunk on ground"},
     "toppled": {"color": "#6a4c93", "marker": "x", "linestyle": ":", "label": "toppled: trunk tilts by over 0.1 rad"},
     "grounded": {"color": "#2a9d5c", "marker": "D", "linestyle": "--", "label": "grounded FLSS: feet close to ground"},

@@ -58,7 +58,7 @@ def walked() -> PhysicalWalk:
 @pytest.fixture(scope="module")
 def start(walked: PhysicalWalk) -> int:
     """A start that is stable at first and falls in the end."""
-    late = np.isfinite(walked.outcomes.fall) & (walked.outcomes.measured_loss > 5)
+    late = np.isfinite(walked.outcomes.fall) & (walked.outcomes.carried_loss > 5)
     assert late.any(), "this test needs a start that falls, but not at once"
     return int(np.argmax(late))
 

@@ -35,7 +35,7 @@ def test_cells_are_those_of_the_comparison(result):
         alone = compare(LDVS, [0.5, 0.7], n_starts=12, observation_time=60.0, conditions=Conditions(vp=vp)).isel(
             controller=0
         )
-        for name in ("planned_loss", "measured_loss", "fall", "tilt", "kinematic", "physical", "physical_high"):
+        for name in ("planned_loss", "carried_loss", "fall", "tilt", "kinematic", "physical", "physical_high"):
             assert np.array_equal(result[name].sel(value=vp).values, alone[name].values), name
 
 
@@ -106,7 +106,7 @@ def test_the_values_of_every_condition_make_sense():
         for value in condition.values:
             varied: Any = {name: value}
             assert Conditions(**varied).values()[name] == value
-    assert set(FLSS) == {"kinematic", "measured", "physical", "toppled", "static"}
+    assert set(FLSS) == {"kinematic", "carried", "physical", "toppled", "static"}
 
 
 @pytest.mark.slow

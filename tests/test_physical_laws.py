@@ -265,7 +265,7 @@ def test_outcomes_are_what_the_chunks_show(controller, velocity, vp, strength):
         assert_array_equal(walked.load[known, start], shown[steps, columns.touch])
         for unknown in (walked.measured.x, walked.height, walked.load):
             assert np.isnan(unknown[len(seen) :, start]).all()
-    assert_array_equal(outcomes.measured_loss, loss_time(walked.measured))
+    assert_array_equal(outcomes.carried_loss, loss_time(walked.measured))
     assert np.isfinite(outcomes.fall).any() == (velocity == 0.7)
     assert outcomes.saturation.any() == (strength < 1.0)
 

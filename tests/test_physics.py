@@ -81,7 +81,7 @@ def test_measured_tips_follow_the_plan(walked):
     both = walked.planned.stance & walked.measured.stance
     off = np.abs(walked.measured.feet - walked.planned.feet)[both]
     assert np.percentile(off, 95) < 2.0
-    assert np.array_equal(walked.outcomes.measured_loss, loss_time(walked.measured))
+    assert np.array_equal(walked.outcomes.carried_loss, loss_time(walked.measured))
     assert walked.outcomes.unreachable.sum() == 0
     assert walked.outcomes.saturation.max() < 0.02
 
@@ -92,8 +92,8 @@ def test_every_bounce_counts_without_a_contact_gap():
         physical_outcomes(settle(draw_starts(20, 0), Conditions(contact_gap=ms)), LDVS, 0.5, 40.0) for ms in (0.0, 10.0)
     )
     assert np.array_equal(every.fall, usual.fall)
-    assert (every.measured_loss <= usual.measured_loss).all()
-    assert np.isfinite(every.measured_loss).sum() > np.isfinite(usual.measured_loss).sum()
+    assert (every.carried_loss <= usual.carried_loss).all()
+    assert np.isfinite(every.carried_loss).sum() > np.isfinite(usual.carried_loss).sum()
 
 
 def test_nothing_is_measured_after_a_fall():

@@ -62,7 +62,7 @@ def test_measures_are_recorded_until_the_fall(walked, fallen):
     assert recording.fall_time == outcomes.fall[fallen]
     assert recording.fall_part == outcomes.fall_part[fallen]
     lost = recording.measured_margin <= 0
-    assert recording.time[int(np.argmax(lost.values))] == recording.measured_loss_time
+    assert recording.time[int(np.argmax(lost.values))] == recording.carried_loss_time
     after = recording.time.values >= outcomes.fall[fallen] + walked.stride.dt
     assert after.any()
     for name in ("measured_x", "measured_margin", "qpos", "centre_of_mass", "planned_tip"):

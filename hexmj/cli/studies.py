@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 AGREEMENT = {
-    "measured": "agreement_measured",
+    "carried": "agreement_carried",
     "grounded": "agreement_grounded",
     "physical": "agreement",
     "same feet": "same_feet",

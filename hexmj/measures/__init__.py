@@ -1,1 +1,1 @@
-"""Measures of stability: kinematic (planned polygon), measured (feet in contact) and physical (falls)."""
+"""Measures of stability: kinematic (planned polygon), carried (feet that carry load) and physical (falls)."""

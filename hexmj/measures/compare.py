@@ -1,4 +1,4 @@
-"""Comparison of the measures of stability on the same starts: planned polygon, measured polygon, and falls."""
+"""Comparison of the measures of stability on the same starts: planned feet, feet in the simulation, and falls."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ from hexmj.timing import Acceleration, Stride
 if TYPE_CHECKING:
     import xarray as xr
 
-MEASURES = {"kinematic": "planned_loss", "measured": "measured_loss", "physical": "fall"}
+MEASURES = {"kinematic": "planned_loss", "carried": "carried_loss", "physical": "fall"}
 """Measure of FLSS -> outcome, the time of the event that the measure counts."""
 
 BESIDE = {"toppled": "topple"}
@@ -99,7 +99,7 @@ def compare(
     folder: Path | None = None,
     **how: Unpack[Execution],
 ) -> "xr.Dataset":
-    """Return the kinematic, measured and physical FLSS of controllers over velocities, on the same starts.
+    """Return the kinematic, carried and physical FLSS of controllers over velocities, on the same starts.
 
     Args:
         controllers: one controller, or several controllers by name.

@@ -30,8 +30,8 @@ class Outcomes:
 
     planned_loss: np.ndarray
     """(start,) first loss of static stability of the plan: planned stance, centre of mass at O [time units]."""
-    measured_loss: np.ndarray
-    """(start,) first measured loss of static stability: feet in contact, the body's centre of mass [time units]."""
+    carried_loss: np.ndarray
+    """(start,) first loss of static stability: feet that carry load, the body's own centre of mass [time units]."""
     fall: np.ndarray
     """(start,) first contact of the trunk with the ground [time units]; environments use `observing.judge`."""
     topple: np.ndarray
@@ -57,7 +57,7 @@ class Outcomes:
     """(start,) number of foot targets out of reach; the leg then keeps its last joint angles."""
 
     def __repr__(self) -> str:
-        times = {"planned loss": self.planned_loss, "measured loss": self.measured_loss, "fell": self.fall}
+        times = {"planned loss": self.planned_loss, "carried loss": self.carried_loss, "fell": self.fall}
         times["toppled"] = self.topple
         counts = ", ".join(f"{name} {np.isfinite(time).sum()}" for name, time in times.items())
         least = f"; least clearance {self.clearance.min():.3g} mm" if len(self.fall) else ""
@@ -92,7 +92,7 @@ class OutcomesSoFar:
         """Begin with the times of the plan's first losses of stability, (start,) [time units]."""
         size, compiled, lengths = len(settled.starts), settled.compiled, settled.conditions.body.lengths
         self._settled, self._planned_loss = settled, planned_loss
-        self._measured_loss, self._fall = np.full(size, np.inf), np.full(size, np.inf)
+        self._carried_loss, self._fall = np.full(size, np.inf), np.full(size, np.inf)
         self._fall_part, self._unreachable = np.full(size, -1), np.zeros(size, dtype=int)
         self._walked, self._commanded, self._depth = np.zeros((3, size))
         upright, (slid, contacts, saturated, shown) = np.ones(size), np.zeros((4, size))
@@ -123,10 +123,10 @@ class OutcomesSoFar:
         share = np.clip(until - m * np.arange(len(chunk.plan.time))[:, None], 0, m) / m
         steps = np.vstack([self._commanded[ids], share * chunk.plan.velocity[:, ids]])
         self._commanded[ids] = np.add.accumulate(steps)[-1]  # step by step, so that chunks do not change the bits
-        stable = np.flatnonzero(np.isinf(self._measured_loss[ids]))
+        stable = np.flatnonzero(np.isinf(self._carried_loss[ids]))
         _, measured, _ = measured_walk(chunk, settled, stable)
         if measured.stance.size:
-            self._measured_loss[ids[stable]] = loss_time(measured, threads=1)
+            self._carried_loss[ids[stable]] = loss_time(measured, threads=1)
 
     def outcomes(self) -> Outcomes:
         """Return the outcomes of each start in the chunks so far.
@@ -142,7 +142,7 @@ class OutcomesSoFar:
             saturation = sums.saturated / (sums.shown * len(compiled.torque_limits))
         found = Outcomes(
             planned_loss=self._planned_loss,
-            measured_loss=self._measured_loss,
+            carried_loss=self._carried_loss,
             fall=self._fall,
             topple=sums.toppled / self._settled.substeps * self._settled.stride.dt,
             fall_part=self._fall_part,

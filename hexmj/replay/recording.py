@@ -57,7 +57,7 @@ MEASURED = {
     "measured_y": (_LEG, "mm", "foot beside the centre of mass, left positive"),
     "measured_stance": (_LEG, "1", "foot touches the ground"),
     "measured_margin": (_STEP, "mm", "measured stability margin"),
-    "measured_loss_time": (_ONCE, "time unit", "first loss of measured static stability, or inf"),
+    "carried_loss_time": (_ONCE, "time unit", "first loss of static stability of the feet that carry load, or inf"),
     "fall_time": (_ONCE, "time unit", "first contact of the trunk with the ground, or inf"),
     "fall_part": (_ONCE, "1", "part that touched the ground first, from 0 at the front; -1 for none"),
     "clearance": (_ONCE, "mm", "least height of the trunk's lowest point"),
@@ -143,7 +143,7 @@ def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> Recording:
         planned_tip=qpos[:, None, :3] + rotated(qpos[:, None, 3:7], tips),
         **{f"measured_{name}": getattr(measured, name)[:, 0] for name in ("x", "y", "stance")},
         measured_margin=walk_margin(measured)[:, 0],
-        measured_loss_time=outcomes.measured_loss[start],
+        carried_loss_time=outcomes.carried_loss[start],
         fall_time=outcomes.fall[start],
         **{name: getattr(outcomes, name)[start] for name in ("fall_part", *REPORTED)},
         qpos=qpos,
@@ -258,7 +258,7 @@ def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
     if "measured_margin" not in recording:
         return summary
     part = int(recording.fall_part)
-    summary["measured loss"] = float(recording.measured_loss_time)
+    summary["carried loss"] = float(recording.carried_loss_time)
     summary["least measured margin [mm]"] = float(recording.measured_margin.min())
     summary["fall"] = float(recording.fall_time)
     summary["fell on"] = recorded_conditions(recording).body.trunk[part] if part >= 0 else None

@@ -92,7 +92,7 @@ class Take:
             planned_tip=shown["planned_tip"].values,
             centre_of_mass=centre,
             qpos=qpos,
-            lost=float(recording[f"{kind}_loss_time"]) / vp,
+            lost=float(recording["carried_loss_time" if physical else "planned_loss_time"]) / vp,
             fell=float(recording["fall_time"]) / vp if physical else np.inf,
             part=body.trunk[part] if part >= 0 else "",
         )
@@ -153,7 +153,7 @@ def walk_figure(recording: xr.Dataset) -> "Figure":
     physical = "measured_stance" in recording
     stance = recording.measured_stance.values if physical else planned
     shown = np.isfinite(recording.qpos.values).all(axis=1)  # False after a fall
-    blue, orange, red = (MEASURE_STYLES[measure]["color"] for measure in ("kinematic", "measured", "physical"))
+    blue, orange, red = (MEASURE_STYLES[measure]["color"] for measure in ("kinematic", "carried", "physical"))
     for row, leg in enumerate(LEGS):
         off = spans(time, ~stance[:, row] & shown)
         footfall.broken_barh(off, (row - 0.38, 0.5 if physical else 0.76), color=orange if physical else blue)
@@ -168,7 +168,7 @@ def walk_figure(recording: xr.Dataset) -> "Figure":
     if physical:
         measured = np.where(np.isfinite(recording.measured_margin), recording.measured_margin, np.nan)
         margin.plot(time, measured, color=orange, linewidth=1.2, label="measured: feet that carry load")
-        events["measured loss"] = float(recording.measured_loss_time)
+        events["measured loss"] = float(recording.carried_loss_time)
         events["trunk on the ground"] = fall = float(recording.fall_time)
         if fall <= time[-1]:
             margin.axvline(fall, color=red, linewidth=1.6, linestyle="-.", label="fall: trunk on the ground")

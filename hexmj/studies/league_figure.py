@@ -39,10 +39,10 @@ class Panel(NamedTuple):
 
 
 def league_figure(result: "xr.Dataset") -> "Figure":
-    """Draw kinematic losses, measured losses and falls, with the lowest frequency of falls at the top."""
+    """Draw kinematic losses, carried losses and falls, with the lowest frequency of falls at the top."""
     shown = by_rank(result)
     missing = shown.missing.values > 0
-    titles = dict(zip(MEASURES, ("kinematic FLSS", "measured FLSS", "frequency of falls"), strict=True))
+    titles = dict(zip(MEASURES, ("kinematic FLSS", "carried FLSS", "frequency of falls"), strict=True))
     panels = []
     for name, title in titles.items():
         starts, fewer = starts_in_words(shown[f"{name}_starts"].max().item()), name != "kinematic" and missing

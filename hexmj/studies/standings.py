@@ -56,7 +56,7 @@ def standings(
         data: result of every cell by entrant and question.
 
     Returns:
-        Over (entrant, velocity): `kinematic`, `measured` and `physical` FLSS with `_low`, `_high` (95 % Wilson); with
+        Over (entrant, velocity): `kinematic`, `carried` and `physical` FLSS with `_low`, `_high` (95 % Wilson); with
         `_above`, the FLSS minus that of the `reference` on the same starts, and its 95 % interval. For walks without a
         fall: actual over commanded `speed`, `slip` [mm/s], `cost` of transport, highest `torque` of a joint over its
         limit. The number of walks that failed, `missing`. For steady-state gaits: the fractions of starts that are
@@ -79,7 +79,7 @@ def standings(
     planned, walked, gaits = (
         cells(f"{kind} {v}" for v in velocities.tolist()) for kind in ("kinematic", "physics", "gait")
     )
-    events = {"kinematic": planned.lost, "measured": happened(walked.measured_loss), "physical": walked.fell}
+    events = {"kinematic": planned.lost, "carried": happened(walked.carried_loss), "physical": walked.fell}
     ideal = np.array([is_ideal(*entrant) for entrant in entrants.items()])
     random = [name for name, begins in zip(names, ideal, strict=True) if not begins]
     reference = REFERENCE if REFERENCE in random else next(iter(random), "")
@@ -150,7 +150,7 @@ WEDGED = 5.0
 times leg length: muscle forces above 50 body weights act at a tenth of the leg's length (Full & Ahn 1995, J. exp. Biol.
 198, 1285, abstract). No value for a stick insect was found."""
 
-MEASURES = {"kinematic": "Kinematic FLSS", "measured": "Measured FLSS", "physical": "Physical FLSS"}
+MEASURES = {"kinematic": "Kinematic FLSS", "carried": "Carried FLSS", "physical": "Physical FLSS"}
 
 
 class Table(NamedTuple):

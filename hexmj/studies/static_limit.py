@@ -39,9 +39,9 @@ GROUNDED = 0.05
 """Height, as a fraction of the standing height, up to which a foot counts as standing in `grounded`. Values from 0.05
 to 0.2 change FLSS at V_p = 20 mm/s by at most 0.04 (`docs/concepts/physics.md`)."""
 
-LOSSES = {"kinematic": "planned_loss", "measured": "measured_loss", "grounded": "grounded_loss", "physical": "fall"}
+LOSSES = {"kinematic": "planned_loss", "carried": "carried_loss", "grounded": "grounded_loss", "physical": "fall"}
 """Measure of FLSS -> outcome, the time of the event that it counts: the measures `compare.MEASURES`, and `grounded`,
-which is `measured` with low-hovering feet counted as standing, see `grounded`."""
+which is `carried` with low-hovering feet counted as standing, see `grounded`."""
 
 DISTANCES = {
     "margin": ("mm", "mean distance between measured and planned stability margin"),
@@ -68,15 +68,15 @@ STYLES: dict[str, dict[str, Any]] = MEASURE_STYLES | {
 """Curve -> its style."""
 
 PANELS = {
-    "share of the starts": {"measured": "measured", "grounded": "grounded", "physical": "physical"},
+    "share of the starts": {"carried": "carried", "grounded": "grounded", "physical": "physical"},
     "agreement with kinematic losses": {
-        "agreement_measured": "measured",
+        "agreement_carried": "carried",
         "agreement_grounded": "grounded",
         "agreement": "physical",
     },
     "distance from the planned margin [mm]": {
         "margin_pressure": "pressure",
-        "margin": "measured",
+        "margin": "carried",
         "margin_grounded": "grounded",
         "margin_same_feet": "same_feet",
     },
@@ -132,7 +132,7 @@ class StaticLimit(Study):
 
         Returns:
             Over (leg_mass, vp): the FLSS of `LOSSES` with 95 % Wilson intervals; `agreement`, the fraction of starts
-            with a planned loss and a fall, or with neither; `agreement_measured` and `agreement_grounded`, the same for
+            with a planned loss and a fall, or with neither; `agreement_carried` and `agreement_grounded`, the same for
             these losses instead of the fall. Over (leg_mass, vp, start): the times of the losses and falls,
             `DISTANCES` and `REPORTED`.
         """
@@ -142,7 +142,7 @@ class StaticLimit(Study):
             leg_mass=("leg_mass", list(self.leg_masses), mass),
         )
         lost = table.planned_loss < np.inf
-        for measure in ("measured", "grounded"):
+        for measure in ("carried", "grounded"):
             same, text = (table[LOSSES[measure]] < np.inf) == lost, f"kinematic and {measure} answer agree"
             table[f"agreement_{measure}"] = same.mean("start").assign_attrs(units="1", long_name=text)
         own = {"velocity": self.velocity, "duration": self.observed[1].item()}
