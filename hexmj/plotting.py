@@ -41,10 +41,11 @@ BESIDE = 0.024
 
 MEASURE_STYLES: dict[str, dict[str, Any]] = {
     "kinematic": {"color": "#1b6ca8", "marker": "o", "linestyle": "-", "label": "kinematic FLSS: planned feet"},
-    "carried": {"color": "#c8740a", "marker": "s", "linestyle": "--", "label": "carried FLSS: feet that carry load"},
+    "dynamic": {"color": "#2b2b2b", "marker": "v", "linestyle": (0, (5, 1)), "label": "FLDS: tipping pendulum"},
+    "grounded": {"color": "#c8740a", "marker": "s", "linestyle": "--", "label": "grounded FLSS: feet at the ground"},
+    "carried": {"color": "#2a9d5c", "marker": "D", "linestyle": "--", "label": "carried FLSS: feet that carry load"},
     "physical": {"color": "#b3261e", "marker": "^", "linestyle": "-.", "label": "frequency of falls: trunk on ground"},
     "toppled": {"color": "#6a4c93", "marker": "x", "linestyle": ":", "label": "toppled: trunk tilts by over 0.1 rad"},
-    "grounded": {"color": "#2a9d5c", "marker": "D", "linestyle": "--", "label": "grounded FLSS: feet close to ground"},
 }
 """Measure -> style and label of its curve; markers and lines differ too, for readers without colours."""
 

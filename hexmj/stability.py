@@ -1,6 +1,6 @@
 """Static stability (paper, Section 3): support polygon, signed stability margin, first loss.
 
-The functions take any feet, planned or measured.  The compiled network decides about stability by a closed form
+The functions take any feet, planned or simulated.  The compiled network decides about stability by a closed form
 that holds only for the paper's geometry (`controllers.cruse1998.kernel`); a test compares both.
 """
 

@@ -1,4 +1,4 @@
-"""Walks, planned or measured, from which both measures of stability are computed; footfall diagrams."""
+"""Walks, planned or simulated, from which both measures of stability are computed; footfall diagrams."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -17,8 +17,8 @@ from hexmj.validate import whole
 class Walk:
     """Tips relative to the centre of mass, and the legs in stance, after each step of many starts.
 
-    A planned walk has the paper's centre of mass (fixed at O), planned tips and planned stance. A
-    measured walk has the body's own centre of mass, the physical tips and the feet that touch the ground.
+    A planned walk has the paper's centre of mass (fixed at O), planned tips and planned stance. A simulated walk has
+    the body's own centre of mass and tips, and the stance of the feet at the ground or of those that carry load.
     """
 
     time: np.ndarray
@@ -30,7 +30,7 @@ class Walk:
     y: np.ndarray
     """(step, start, leg) distance of the tips from the body axis, left positive [mm]."""
     stance: np.ndarray
-    """(step, start, leg) True where the leg retracts (planned) or touches the ground (measured)."""
+    """(step, start, leg) True where the leg retracts (planned) or the foot supports the body (simulated)."""
     geometry: Geometry = FIG1
     """Origins of the legs' axes, and lines on which the tips move."""
 

@@ -212,7 +212,7 @@ def test_a_walk_writes_a_recording_a_figure_and_a_manifest(run, tmp_path, words)
     recording = hexmj.load_recording(tmp_path / "recording.nc")
     walk = hexmj.walk(hexmj.draw_starts(1, 0), hexmj.LDVS, 0.5, 8.0)
     np.testing.assert_array_equal(recording.planned_stance.values, walk.stance[:, 0])
-    assert ("measured_margin" in recording) == bool(words)
+    assert ("grounded_margin" in recording) == bool(words)
     assert {Path(name).name for name in json.loads(text)["files"]} == {"recording.nc", "walk.png", "manifest.json"}
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert manifest["command"][0] == "walk" and manifest["settings"]["conditions"]["vp"] == 80.0

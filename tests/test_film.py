@@ -58,7 +58,7 @@ def walked() -> PhysicalWalk:
 @pytest.fixture(scope="module")
 def start(walked: PhysicalWalk) -> int:
     """A start that is stable at first and falls in the end."""
-    late = np.isfinite(walked.outcomes.fall) & (walked.outcomes.carried_loss > 5)
+    late = np.isfinite(walked.outcomes.fall) & (walked.outcomes.grounded_loss > 5)
     assert late.any(), "this test needs a start that falls, but not at once"
     return int(np.argmax(late))
 
@@ -87,10 +87,10 @@ def test_a_film_has_the_frames_of_its_walk_in_its_colours(fallen, tmp_path):
     shots = scene(played)
     assert np.abs(np.diff(shots[:10], axis=0)).max(axis=(1, 2, 3)).min() > 20
     vp, dt = fallen.attrs["vp"], fallen.attrs["dt"]
-    shown = np.isfinite(fallen.measured_margin.values).sum()
+    shown = np.isfinite(fallen.grounded_margin.values).sum()
     for frame in range(frames):
         row = int(np.clip(round(frame / 120 * vp / dt) - 1, 0, shown - 1))
-        stable = bool(fallen.measured_margin[row] > 0)
+        stable = bool(fallen.grounded_margin[row] > 0)
         assert (green(shots[frame]) > 1000) == stable, frame
         assert (red(shots[frame]) > 300) == (not stable), frame
     after = round(float(fallen.fall_time) / vp * 120) + 2
@@ -154,7 +154,7 @@ def test_the_overlay_says_what_is_known(fallen, plan):
     states = [overlay._state(row, seconds)[0] for row, seconds in ((0, 0.0), (unstable, take.lost), (0, take.fell))]
     assert [state[0] for state in states] == ["●", "▲", "■"]
     again = replace(take, margin=np.abs(take.margin))
-    assert "stable (measured loss at" in Overlay(again, Film(), 0.0, 1.0)._state(unstable, take.lost)[0]
+    assert "stable (grounded loss at" in Overlay(again, Film(), 0.0, 1.0)._state(unstable, take.lost)[0]
     assert [margin_in_words(margin) for margin in (-1.25, -np.inf)] == ["margin -1.2 mm", "no foot stands"]
     frame = np.full((480, 640, 3), 200, dtype=np.uint8)
     overlay.draw(frame, 0, 0.0, 5.0)

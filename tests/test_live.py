@@ -45,7 +45,7 @@ def test_an_unchanged_walk_is_the_measured_one(controller):
     for name, values in {
         "qpos": measured.qpos[:, 0],
         "centre_of_mass": measured.centre_of_mass[:, 0],
-        "stance": measured.measured.stance[:, 0],
+        "stance": measured.grounded.stance[:, 0],
         "planned_stance": measured.ordered.stance[:, 0],
     }.items():
         np.testing.assert_array_equal([getattr(moment, name) for moment in shown], values[rows])

@@ -59,7 +59,7 @@ def array(packed: dict[str, Any]) -> np.ndarray:
 def test_margins_times_and_stance_are_the_recording_s_to_the_last_bit(fallen, plan):
     for recording, data in zip((fallen, plan), embedded(page_text([fallen, plan])), strict=True):
         names = ["planned_margin", "planned_stance", "seconds"]
-        names += ["measured_margin", "measured_stance"] if data["physical"] else []
+        names += ["grounded_margin", "grounded_stance"] if data["physical"] else []
         for name in names:
             shown = array(data[name])
             assert shown.dtype in (np.float64, np.uint8)
@@ -169,7 +169,7 @@ def test_bad_arguments_are_refused(plan, tmp_path):
 @pytest.mark.slow
 def test_a_browser_without_a_network_plays_it(fallen, plan, tmp_path):
     path = page([fallen, plan], tmp_path / "page.html")
-    fell = int(np.isfinite(fallen.measured_margin.values).sum())
+    fell = int(np.isfinite(fallen.grounded_margin.values).sum())
     drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
     with tab() as opened:
         opened.resize(390, 740)
@@ -179,7 +179,7 @@ def test_a_browser_without_a_network_plays_it(fallen, plan, tmp_path):
             opened.value(f"(() => {{ const s = document.querySelector('#time'); s.value = {step}; s.oninput(); }})()")
             opened.value(drawn)
             shown = opened.value("[...document.querySelectorAll('.margin')].map((margin) => margin.value)")
-            expected = fallen.measured_margin.values[step - 1], plan.planned_margin.values[step - 1]
+            expected = fallen.grounded_margin.values[step - 1], plan.planned_margin.values[step - 1]
             np.testing.assert_array_equal([float(margin) for margin in shown], expected)
         assert "fell on" in opened.value("document.querySelector('.word').textContent")
         opened.value("(() => { const s = document.querySelector('#time'); s.value = 0; s.oninput(); })()")

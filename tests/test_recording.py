@@ -61,11 +61,11 @@ def test_measures_are_recorded_until_the_fall(walked, fallen):
     recording, outcomes = record(walked, fallen), walked.outcomes
     assert recording.fall_time == outcomes.fall[fallen]
     assert recording.fall_part == outcomes.fall_part[fallen]
-    lost = recording.measured_margin <= 0
-    assert recording.time[int(np.argmax(lost.values))] == recording.carried_loss_time
+    lost = recording.grounded_margin <= 0
+    assert recording.time[int(np.argmax(lost.values))] == recording.grounded_loss_time
     after = recording.time.values >= outcomes.fall[fallen] + walked.stride.dt
     assert after.any()
-    for name in ("measured_x", "measured_margin", "qpos", "centre_of_mass", "planned_tip"):
+    for name in ("measured_x", "grounded_margin", "qpos", "centre_of_mass", "planned_tip"):
         values = recording[name].values.reshape(len(after), -1)
         assert np.isnan(values[after]).all(), name
         assert np.isfinite(values[~after][:-1]).all(), name

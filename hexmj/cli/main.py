@@ -20,7 +20,7 @@ its stability.
 Walk and measure
   walk              one walk: footfall diagram, stability margin and a recording
   flss              frequency of the loss of static stability over velocities
-  compare           kinematic, carried and physical FLSS on the same starts
+  compare           all measures of stability on the same starts
 
 Look
   render            a video of recordings, or of a walk that is recorded first

@@ -28,6 +28,7 @@ FOOT_PATH = ("vp", "step_height", "standing_height", "lift_time", "landing_time"
 EXPLAINED = """\
 t: observation time [time units]
 kinematic: the centre of mass leaves the support polygon of the planned feet
+grounded: it leaves the polygon of the feet at the ground in the simulation
 carried: it leaves the polygon of the feet that carry load in the simulation
 physical: falls, that is, the trunk touches the ground
 
@@ -37,7 +38,7 @@ both, kin., phys., none: starts with both, only a loss, only a fall, neither"""
 
 TOPPLED = "toppled: the trunk tilts by more than 0.1 rad"
 
-TIMES = ("planned loss", "carried loss", "fall")
+TIMES = ("planned loss", "grounded loss", "carried loss", "fall")
 """Entries of a walk's summary that are times [time units]; infinity says that the event does not happen."""
 
 
@@ -160,8 +161,8 @@ class CompareOptions:
 
 
 class Compare(StudyCommand):
-    """Compare the kinematic, carried and physical FLSS of controllers on the same starts. Write a table, a figure,
-    NetCDF, a manifest and a gait video. Repeat the command to resume a stopped run."""
+    """Compare the kinematic, grounded, carried and physical FLSS of controllers on the same starts. Write a table, a
+    figure, NetCDF, a manifest and a gait video. Repeat the command to resume a stopped run."""
 
     study = "measures.compare:Comparison"
     own = (CompareOptions,)

@@ -1,1 +1,1 @@
-"""Measures of stability: kinematic (planned polygon), carried (feet that carry load) and physical (falls)."""
+"""Measures of stability: planned feet, feet at the ground, feet that carry load, and falls."""

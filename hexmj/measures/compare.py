@@ -19,7 +19,12 @@ from hexmj.timing import Acceleration, Stride
 if TYPE_CHECKING:
     import xarray as xr
 
-MEASURES = {"kinematic": "planned_loss", "carried": "carried_loss", "physical": "fall"}
+MEASURES = {
+    "kinematic": "planned_loss",
+    "grounded": "grounded_loss",
+    "carried": "carried_loss",
+    "physical": "fall",
+}
 """Measure of FLSS -> outcome, the time of the event that the measure counts."""
 
 BESIDE = {"toppled": "topple"}
@@ -99,7 +104,7 @@ def compare(
     folder: Path | None = None,
     **how: Unpack[Execution],
 ) -> "xr.Dataset":
-    """Return the kinematic, carried and physical FLSS of controllers over velocities, on the same starts.
+    """Return the FLSS of controllers by all `MEASURES` over velocities, on the same starts.
 
     Args:
         controllers: one controller, or several controllers by name.

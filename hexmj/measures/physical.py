@@ -11,7 +11,7 @@ from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import advanced, begin, check_same
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
 from hexmj.measures.kinematic import first_loss
-from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar, WalkSoFar
+from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar, WalkSoFar, grounded
 from hexmj.physics.pushes import Push
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, Settling
@@ -29,7 +29,7 @@ class PhysicalWalk:
     ordered: PlannedWalk
     """The plan that the legs followed: `planned`, or with feedback the plan as adjusted, which is NaN after a fall."""
     measured: Walk
-    """The walk of the insect: feet in contact, and tips relative to its own centre of mass and heading."""
+    """The simulated walk: feet that carry load, and tips relative to the insect's own centre of mass and heading."""
     outcomes: Outcomes
     """Losses, falls and other numbers of every start."""
     qpos: np.ndarray
@@ -37,7 +37,7 @@ class PhysicalWalk:
     centre_of_mass: np.ndarray
     """(step, start, 3) position of the centre of mass in the world [mm]."""
     height: np.ndarray
-    """(step, start, leg) height of the feet above the ground [mm]; negative for a foot that has sunk in."""
+    """(step, start, leg) height of the feet's lowest points above the ground [mm]; negative if a foot has sunk in."""
     load: np.ndarray
     """(step, start, leg) normal force of the ground on a foot minus its adhesion [g mm/s^2]; negative if adhesion holds
     it down. Read in the first substep of the next step; after the last step, in the last substep."""
@@ -50,16 +50,22 @@ class PhysicalWalk:
     """(step, start, leg, 3) force of the ground on each foot in the world, without adhesion, in the substep of `load`
     [g mm/s^2]; None unless `physical_walk` keeps forces."""
 
+    @property
+    def grounded(self) -> Walk:
+        """The simulated walk `measured`, but with the stance of the feet at the ground, see `outcomes.grounded`."""
+        return grounded(self.measured, self.height, self.conditions)
+
     def __repr__(self) -> str:
         return f"PhysicalWalk({extent(self.ordered)}; {self.outcomes!r})"
 
     def _repr_html_(self) -> str | None:
         """Return a diagram of the feet that are off the ground for notebooks, as HTML."""
-        if len(self.measured.time) < 2 or not self.measured.stance.shape[1]:
+        walk = self.grounded
+        if len(walk.time) < 2 or not walk.stance.shape[1]:
             return None
-        known, fall = ~np.isnan(self.measured.x[:, 0]), self.outcomes.fall[0]
-        title = "start 0 as measured" + (f", which fell at {fall:.4g}" if np.isfinite(fall) else "")
-        return footfall_html(repr(self), self.measured.time, known & ~self.measured.stance[:, 0], title)
+        known, fall = ~np.isnan(walk.x[:, 0]), self.outcomes.fall[0]
+        title = "start 0 in the simulation" + (f", which fell at {fall:.4g}" if np.isfinite(fall) else "")
+        return footfall_html(repr(self), walk.time, known & ~walk.stance[:, 0], title)
 
 
 def physical_walk(

@@ -1,10 +1,11 @@
 """Outcomes of physical walks, added up chunk by chunk: measured walks, losses of stability, falls and effort."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from hexmj.conditions import Conditions
 from hexmj.errors import OutOfReach, SimulationError
 from hexmj.jitted import jitted
 from hexmj.physics.foot_path import steps_in_chunk
@@ -16,6 +17,9 @@ from hexmj.walks import PlannedWalk, Walk
 
 TOPPLED = 0.1
 """Tilt of the trunk, in any direction, beyond which a start counts as toppled [rad]."""
+
+GROUNDED = 0.1
+"""Height of a foot's lowest point, as a fraction of the standing height, below which the foot is at the ground."""
 
 MOST_UNREACHABLE = 0.1
 """Maximum share of a walk's foot targets that may be out of reach."""
@@ -30,6 +34,8 @@ class Outcomes:
 
     planned_loss: np.ndarray
     """(start,) first loss of static stability of the plan: planned stance, centre of mass at O [time units]."""
+    grounded_loss: np.ndarray
+    """(start,) first loss of static stability: feet at the ground, the body's own centre of mass [time units]."""
     carried_loss: np.ndarray
     """(start,) first loss of static stability: feet that carry load, the body's own centre of mass [time units]."""
     fall: np.ndarray
@@ -57,8 +63,8 @@ class Outcomes:
     """(start,) number of foot targets out of reach; the leg then keeps its last joint angles."""
 
     def __repr__(self) -> str:
-        times = {"planned loss": self.planned_loss, "carried loss": self.carried_loss, "fell": self.fall}
-        times["toppled"] = self.topple
+        times = {"planned loss": self.planned_loss, "grounded loss": self.grounded_loss}
+        times |= {"carried loss": self.carried_loss, "fell": self.fall, "toppled": self.topple}
         counts = ", ".join(f"{name} {np.isfinite(time).sum()}" for name, time in times.items())
         least = f"; least clearance {self.clearance.min():.3g} mm" if len(self.fall) else ""
         return f"Outcomes(of {len(self.fall)}: {counts}{least})"
@@ -92,7 +98,7 @@ class OutcomesSoFar:
         """Begin with the times of the plan's first losses of stability, (start,) [time units]."""
         size, compiled, lengths = len(settled.starts), settled.compiled, settled.conditions.body.lengths
         self._settled, self._planned_loss = settled, planned_loss
-        self._carried_loss, self._fall = np.full(size, np.inf), np.full(size, np.inf)
+        self._grounded_loss, self._carried_loss, self._fall = np.full((3, size), np.inf)
         self._fall_part, self._unreachable = np.full(size, -1), np.zeros(size, dtype=int)
         self._walked, self._commanded, self._depth = np.zeros((3, size))
         upright, (slid, contacts, saturated, shown) = np.ones(size), np.zeros((4, size))
@@ -123,10 +129,12 @@ class OutcomesSoFar:
         share = np.clip(until - m * np.arange(len(chunk.plan.time))[:, None], 0, m) / m
         steps = np.vstack([self._commanded[ids], share * chunk.plan.velocity[:, ids]])
         self._commanded[ids] = np.add.accumulate(steps)[-1]  # step by step, so that chunks do not change the bits
-        stable = np.flatnonzero(np.isinf(self._carried_loss[ids]))
-        _, measured, _ = measured_walk(chunk, settled, stable)
-        if measured.stance.size:
-            self._carried_loss[ids[stable]] = loss_time(measured, threads=1)
+        stable = np.flatnonzero(np.isinf(self._carried_loss[ids]) | np.isinf(self._grounded_loss[ids]))
+        ends = measured_walk(chunk, settled, stable)
+        if ends.measured.stance.size:
+            near, which = grounded(ends.measured, ends.height, settled.conditions), ids[stable]
+            for loss, walk in ((self._carried_loss, ends.measured), (self._grounded_loss, near)):
+                loss[which] = np.minimum(loss[which], loss_time(walk, threads=1))
 
     def outcomes(self) -> Outcomes:
         """Return the outcomes of each start in the chunks so far.
@@ -142,6 +150,7 @@ class OutcomesSoFar:
             saturation = sums.saturated / (sums.shown * len(compiled.torque_limits))
         found = Outcomes(
             planned_loss=self._planned_loss,
+            grounded_loss=self._grounded_loss,
             carried_loss=self._carried_loss,
             fall=self._fall,
             topple=sums.toppled / self._settled.substeps * self._settled.stride.dt,
@@ -183,20 +192,19 @@ class WalkSoFar(OutcomesSoFar):
     def add(self, chunk: Chunk) -> None:
         """Add one chunk of `rollout.drive`."""
         super().add(chunk)
-        columns, seen, centre = measured_walk(chunk, self._settled)
-        compiled, sensors, over = self._settled.compiled, chunk.sensors[:, columns], columns[:, None] >= chunk.valid
-        feet = sensors[..., compiled.columns.foot].reshape(*sensors.shape[:2], 6, 3)
-        at = np.ix_((chunk.first + columns) // self._settled.substeps - 1, chunk.ids)
+        substeps, measured, centre, height = measured_walk(chunk, self._settled)
+        columns, sensors = self._settled.compiled.columns, chunk.sensors[:, substeps]
+        at = np.ix_((chunk.first + substeps) // self._settled.substeps - 1, chunk.ids)
         for name in ("x", "y", "stance"):
-            getattr(self.measured, name)[at] = getattr(seen, name)
-        found = {name: getattr(chunk, name)[:, columns] for name in ("load", "qpos", "torque") if name in self.kept}
+            getattr(self.measured, name)[at] = getattr(measured, name)
+        found = {name: getattr(chunk, name)[:, substeps] for name in ("load", "qpos", "torque") if name in self.kept}
         if "ground_force" in self.kept:
-            found["ground_force"] = 0.0 - sensors[..., compiled.columns.feet_push].reshape(feet.shape)
-            found["ground_force"][..., 2] -= sensors[..., compiled.columns.touch] - found["load"]  # adhesion
-        found |= {"height": -compiled.depth(feet), "centre_of_mass": centre.swapaxes(0, 1)}
+            found["ground_force"] = 0.0 - sensors[..., columns.feet_push].reshape(*sensors.shape[:2], 6, 3)
+            found["ground_force"][..., 2] -= sensors[..., columns.touch] - found["load"]  # adhesion
         for name, values in found.items():
-            values.swapaxes(0, 1)[over] = np.nan
+            values.swapaxes(0, 1)[substeps[:, None] >= chunk.valid] = np.nan
             self.kept[name][at] = values.swapaxes(0, 1)
+        self.kept["height"][at], self.kept["centre_of_mass"][at] = height, centre
 
 
 def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
@@ -206,19 +214,37 @@ def _percentile(counts: np.ndarray, share: float, width: float) -> np.ndarray:
     return np.where(counts.any(axis=1), ends[np.argmax(reached, axis=1)], np.nan)
 
 
-def measured_walk(
-    chunk: Chunk, settled: Settled, rows: np.ndarray | None = None
-) -> tuple[np.ndarray, Walk, np.ndarray]:
-    """Return the measured walk at the ends of the plan's steps within a chunk.
+class StepEnds(NamedTuple):
+    """The bodies of n starts at the ends of the plan's steps within a chunk."""
+
+    substeps: np.ndarray
+    """(step,) substeps of the chunk at which these steps end."""
+    measured: Walk
+    """Walk of the feet that carry load; after a fall it is NaN and no foot stands. Its velocities are all NaN."""
+    centre_of_mass: np.ndarray
+    """(step, n, 3) centre of mass in the world [mm]; NaN after a fall."""
+    height: np.ndarray
+    """(step, n, leg) height of the feet's lowest points above the ground [mm]; NaN after a fall."""
+
+
+def grounded(measured: Walk, height: np.ndarray, conditions: Conditions) -> Walk:
+    """Return a measured walk in which all feet at the ground stand: those below `GROUNDED` standing heights.
+
+    Args:
+        measured: walk of the simulated bodies.
+        height: height of the feet's lowest points above the ground, (step, start, leg) [mm].
+        conditions: conditions of the walk.
+    """
+    return replace(measured, stance=height < GROUNDED * conditions.standing_height)
+
+
+def measured_walk(chunk: Chunk, settled: Settled, rows: np.ndarray | None = None) -> StepEnds:
+    """Return the bodies at the ends of the plan's steps within a chunk.
 
     Args:
         chunk: a chunk of `rollout.drive`.
         settled: all starts of the walk.
         rows: rows of the chunk whose starts are measured, (n,), by default all.
-
-    Returns:
-        Substeps of the chunk at which these steps end, (step,); the walk of the starts; and the centre of mass in the
-        world, (step, n, 3) [mm]. After a fall the walk is NaN and no foot stands. The walk's velocities are all NaN.
     """
     m, stride, columns = settled.substeps, settled.stride, settled.compiled.columns
     rows = np.arange(len(chunk.ids)) if rows is None else rows
@@ -230,7 +256,9 @@ def measured_walk(
     _measure((chunk.qpos, chunk.sensors, chunk.standing, chunk.valid), rows, shown, places, (x, y, stance, centre))
     time, velocity = (chunk.first + shown) // m * stride.dt, np.full(shape, np.nan)
     walk = Walk(time, velocity, x - np.array(stride.geometry.origin), y, stance, stride.geometry)
-    return shown, walk, centre
+    feet = chunk.sensors[rows, shown[:, None], columns.foot].reshape(*shape, 6, 3)
+    known = (shown[:, None] < chunk.valid[rows])[..., None]
+    return StepEnds(shown, walk, centre, np.where(known, -settled.compiled.depth(feet), np.nan))
 
 
 class EffortSoFar:

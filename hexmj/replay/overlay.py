@@ -35,8 +35,8 @@ class Overlay:
         self._top, self._bottom = self._pixels(CAPTION), height - self._pixels(DIAGRAM)
         self._left, self._right = self._pixels(30), width - self._pixels(12)
         lost = f"loss at {1000 * take.lost:.0f} ms" if np.isfinite(take.lost) else "no loss"
-        self._loss = f"{'measured' if take.physical else 'planned'} {lost}"
-        self._swing = ImageColor.getrgb(MEASURE_STYLES["carried" if take.physical else "kinematic"]["color"])
+        self._loss = f"{'grounded' if take.physical else 'planned'} {lost}"
+        self._swing = ImageColor.getrgb(MEASURE_STYLES["grounded" if take.physical else "kinematic"]["color"])
         self._legend = self._marks()
         self._blank = self._axes(width, height - self._bottom)
         self._full = self._bars(self._blank.copy())

@@ -27,7 +27,7 @@ MOST_POSES = 4000
 """Maximum number of poses in a page; in a long walk, the time between two poses is longer than `POSE_INTERVAL`."""
 
 PLANNED = {"seconds": "f8", "velocity": "f4", "planned_margin": "f8", "planned_stance": "u1"}
-MEASURED = {"measured_margin": "f8", "measured_stance": "u1"}
+GROUNDED = {"grounded_margin": "f8", "grounded_stance": "u1"}
 SHAPE = {"corners": "f4", "normals": "f4", "faces": "u4", "colour": "f4", "body": "u1"}
 """Array in a page -> its type: arrays of every recording, of a physical walk only, and of a `Shape`."""
 
@@ -35,8 +35,8 @@ SHAPE = {"corners": "f4", "normals": "f4", "faces": "u4", "colour": "f4", "body"
 def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STICK_INSECT) -> Path:
     """Write one recording, or two side by side with one clock, as a page that plays in any current browser.
 
-    The page draws the walk in 3D with its support polygon, centre of mass, planned and measured tips, and beside it the
-    footfall diagram and the stability margin with the recording's own values.
+    The page draws the walk in 3D with its support polygon, centre of mass, planned and simulated tips. Beside it are
+    the footfall diagram and the stability margin with the recording's own values.
 
     Args:
         recordings: one or two recordings.
@@ -101,7 +101,7 @@ def _page_data(recording: xr.Dataset, take: Take) -> dict[str, Any]:
         "level": _packed(levels, "f4"),
         "body": _packed_parts(joined(body_shapes(model)), SHAPE),
         "ground": _packed_parts(ground_shape(compiled), SHAPE),
-    } | (_packed_parts(recording, MEASURED) if take.physical else {})
+    } | (_packed_parts(recording, GROUNDED) if take.physical else {})
 
 
 def _conditions_text(conditions: Conditions, physical: bool) -> str:

@@ -55,9 +55,11 @@ PLANNED = {
 MEASURED = {
     "measured_x": (_LEG, "mm", "foot ahead of the centre of mass, from the origin of its axis"),
     "measured_y": (_LEG, "mm", "foot beside the centre of mass, left positive"),
-    "measured_stance": (_LEG, "1", "foot touches the ground"),
-    "measured_margin": (_STEP, "mm", "measured stability margin"),
-    "carried_loss_time": (_ONCE, "time unit", "first loss of static stability of the feet that carry load, or inf"),
+    "measured_stance": (_LEG, "1", "foot carries load"),
+    "grounded_stance": (_LEG, "1", "foot is at the ground"),
+    "grounded_margin": (_STEP, "mm", "stability margin of the feet at the ground"),
+    "grounded_loss_time": (_ONCE, "time unit", "first loss of static stability, feet at the ground, or inf"),
+    "carried_loss_time": (_ONCE, "time unit", "first loss of static stability, feet that carry load, or inf"),
     "fall_time": (_ONCE, "time unit", "first contact of the trunk with the ground, or inf"),
     "fall_part": (_ONCE, "1", "part that touched the ground first, from 0 at the front; -1 for none"),
     "clearance": (_ONCE, "mm", "least height of the trunk's lowest point"),
@@ -74,7 +76,7 @@ MEASURED = {
 """Further variables of the recording of a physical walk. The recording of a plan has none of them."""
 
 OPTIONAL = ("joint_angle", "tip", "joint_torque", "ground_force")
-"""Variables that recordings of 0.5.0 do not have; the last two need a walk that keeps forces."""
+"""Variables that recordings of plans of 0.5.0 do not have; the last two need a walk that keeps forces."""
 
 
 @dataclass(frozen=True)
@@ -134,15 +136,17 @@ def record(walk: PhysicalWalk, start: int = 0, title: str = "") -> Recording:
     Returns:
         The variables of `PLANNED` and `MEASURED`, with the title, the conditions and the stride as attributes.
     """
-    planned, measured = one_start(walk.planned, start), one_start(walk.measured, start)
+    planned, grounded = one_start(walk.planned, start), one_start(walk.grounded, start)
     qpos, outcomes = walk.qpos[:, start], walk.outcomes
     tips, _ = _lifted_tips(one_start(walk.ordered, start), walk.conditions, walk.stride)
     kept = {"joint_torque": walk.torque, "ground_force": walk.ground_force}
     return _dataset(
         *(planned, walk.conditions, walk.stride, title),
         planned_tip=qpos[:, None, :3] + rotated(qpos[:, None, 3:7], tips),
-        **{f"measured_{name}": getattr(measured, name)[:, 0] for name in ("x", "y", "stance")},
-        measured_margin=walk_margin(measured)[:, 0],
+        **{f"measured_{name}": getattr(walk.measured, name)[:, start] for name in ("x", "y", "stance")},
+        grounded_stance=grounded.stance[:, 0],
+        grounded_margin=walk_margin(grounded)[:, 0],
+        grounded_loss_time=outcomes.grounded_loss[start],
         carried_loss_time=outcomes.carried_loss[start],
         fall_time=outcomes.fall[start],
         **{name: getattr(outcomes, name)[start] for name in ("fall_part", *REPORTED)},
@@ -203,12 +207,12 @@ def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
 
 
 def load_recording(path: Path | str) -> Recording:
-    """Read a recording that `save_recording` wrote, with this version of hexmj or with 0.5.0.
+    """Read a recording that `save_recording` wrote with this version of hexmj, or a recording of a plan of 0.5.0.
 
-    A recording of 0.5.0 gets its joint angles and tips from `qpos`; it has no joint torques and no ground forces.
+    A recording of 0.5.0 gets its joint angles and tips from `qpos`.
 
     Raises:
-        InputError: the file cannot be read, or is not a recording.
+        InputError: the file cannot be read, is not a recording, or is a physical walk of 0.5.0.
     """
     loaded = read_netcdf(path)
     check_recording(loaded, f"{path}: ")
@@ -219,6 +223,8 @@ def load_recording(path: Path | str) -> Recording:
 
 def check_recording(recording: xr.Dataset, where: str = "") -> None:
     """Raise InputError if a variable or an attribute of a recording is missing."""
+    if "measured_margin" in recording:
+        raise InputError(f"{where}a physical walk of hexmj 0.5.0; record the walk again")
     physical = not MEASURED.keys().isdisjoint(recording.variables)
     variables = TIMES | PLANNED | (MEASURED if physical else {})
     attributes = ["title", *Conditions().settings(), *_stride_settings(Stride())]
@@ -255,11 +261,12 @@ def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
         "planned loss": float(recording.planned_loss_time),
         "least planned margin [mm]": float(recording.planned_margin.min()),
     }
-    if "measured_margin" not in recording:
+    if "grounded_margin" not in recording:
         return summary
     part = int(recording.fall_part)
+    summary["grounded loss"] = float(recording.grounded_loss_time)
+    summary["least grounded margin [mm]"] = float(recording.grounded_margin.min())
     summary["carried loss"] = float(recording.carried_loss_time)
-    summary["least measured margin [mm]"] = float(recording.measured_margin.min())
     summary["fall"] = float(recording.fall_time)
     summary["fell on"] = recorded_conditions(recording).body.trunk[part] if part >= 0 else None
     for name in REPORTED:

@@ -12,10 +12,11 @@ from hexmj.files import write_text
 
 COLUMNS = {
     "seconds": "time [s]", "time": "time [time units]", "velocity": "velocity [V_p]",
-    "planned_margin": "planned margin [mm]", "measured_margin": "measured margin [mm]",
+    "planned_margin": "planned margin [mm]", "grounded_margin": "grounded margin [mm]",
     "root": "root {pose}", "centre_of_mass": "centre of mass {coordinate} [mm]",
     "joint_angle": "{joint} [rad]", "joint_torque": "{joint} torque [mN mm]",
     "planned_stance": "{leg} planned stance", "measured_stance": "{leg} contact",
+    "grounded_stance": "{leg} at the ground",
     "planned_tip": "{leg} planned {coordinate} [mm]", "tip": "{leg} tip {coordinate} [mm]",
     "ground_force": "{leg} force {coordinate} [mN]",
 }  # fmt: skip

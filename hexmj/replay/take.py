@@ -40,9 +40,9 @@ class Take:
     velocity: np.ndarray
     """(step,) V_r as a fraction of V_p."""
     margin: np.ndarray
-    """(step,) stability margin [mm], measured in a physical walk, otherwise planned."""
+    """(step,) stability margin [mm] of the feet at the ground in a physical walk, otherwise of the planned feet."""
     stance: np.ndarray
-    """(step, leg) True where a foot stands."""
+    """(step, leg) True where a foot is at the ground in a physical walk, otherwise where it stands in the plan."""
     feet: np.ndarray
     """(step, leg, 2) horizontal positions of the feet in the world [mm]."""
     planned_tip: np.ndarray
@@ -70,13 +70,13 @@ class Take:
         poses = int(np.isfinite(recording["qpos"].values).all(axis=1).sum())
         if poses == 0:
             raise InputError(f"the recording {recording.attrs['title']!r} contains no pose; expected at least one")
-        physical = "measured_stance" in recording
-        kind = "measured" if physical else "planned"
+        physical = "grounded_stance" in recording
+        kind, tips = ("grounded", "measured") if physical else ("planned", "planned")
         shown, vp = recording.isel(step=slice(poses)), conditions.vp
         centre, qpos = shown["centre_of_mass"].values, shown["qpos"].values
         step = float(recording.attrs["dt"]) / vp
-        ahead = shown[f"{kind}_x"].values + np.tile(recording.attrs["origins"], 2)
-        seen = np.stack([ahead, shown[f"{kind}_y"].values], axis=-1)
+        ahead = shown[f"{tips}_x"].values + np.tile(recording.attrs["origins"], 2)
+        seen = np.stack([ahead, shown[f"{tips}_y"].values], axis=-1)
         part = int(recording["fall_part"]) if physical else -1
         return cls(
             title=recording.attrs["title"],
@@ -92,7 +92,7 @@ class Take:
             planned_tip=shown["planned_tip"].values,
             centre_of_mass=centre,
             qpos=qpos,
-            lost=float(recording["carried_loss_time" if physical else "planned_loss_time"]) / vp,
+            lost=float(recording[f"{kind}_loss_time"]) / vp,
             fell=float(recording["fall_time"]) / vp if physical else np.inf,
             part=body.trunk[part] if part >= 0 else "",
         )
@@ -150,10 +150,10 @@ def walk_figure(recording: xr.Dataset) -> "Figure":
     figure = picture(8.0, 5.0)
     footfall, margin = figure.subplots(2, 1, sharex=True, height_ratios=(1.2, 1.0))
     time, planned = recording.time.values, recording.planned_stance.values
-    physical = "measured_stance" in recording
-    stance = recording.measured_stance.values if physical else planned
+    physical = "grounded_stance" in recording
+    stance = recording.grounded_stance.values if physical else planned
     shown = np.isfinite(recording.qpos.values).all(axis=1)  # False after a fall
-    blue, orange, red = (MEASURE_STYLES[measure]["color"] for measure in ("kinematic", "carried", "physical"))
+    blue, orange, red = (MEASURE_STYLES[measure]["color"] for measure in ("kinematic", "grounded", "physical"))
     for row, leg in enumerate(LEGS):
         off = spans(time, ~stance[:, row] & shown)
         footfall.broken_barh(off, (row - 0.38, 0.5 if physical else 0.76), color=orange if physical else blue)
@@ -166,9 +166,9 @@ def walk_figure(recording: xr.Dataset) -> "Figure":
     margin.plot(time, recording.planned_margin, color=blue, linewidth=1.2, label="planned")
     events = {"planned loss of static stability": float(recording.planned_loss_time)}
     if physical:
-        measured = np.where(np.isfinite(recording.measured_margin), recording.measured_margin, np.nan)
-        margin.plot(time, measured, color=orange, linewidth=1.2, label="measured: feet that carry load")
-        events["measured loss"] = float(recording.carried_loss_time)
+        known = np.where(np.isfinite(recording.grounded_margin), recording.grounded_margin, np.nan)
+        margin.plot(time, known, color=orange, linewidth=1.2, label="grounded: feet at the ground")
+        events["grounded loss"] = float(recording.grounded_loss_time)
         events["trunk on the ground"] = fall = float(recording.fall_time)
         if fall <= time[-1]:
             margin.axvline(fall, color=red, linewidth=1.6, linestyle="-.", label="fall: trunk on the ground")

@@ -39,19 +39,18 @@ class Panel(NamedTuple):
 
 
 def league_figure(result: "xr.Dataset") -> "Figure":
-    """Draw kinematic losses, carried losses and falls, with the lowest frequency of falls at the top."""
+    """Draw the frequencies of all `MEASURES`, with the lowest frequency of falls at the top."""
     shown = by_rank(result)
     missing = shown.missing.values > 0
-    titles = dict(zip(MEASURES, ("kinematic FLSS", "carried FLSS", "frequency of falls"), strict=True))
     panels = []
-    for name, title in titles.items():
+    for name, title in (MEASURES | {"physical": "Frequency of falls"}).items():
         starts, fewer = starts_in_words(shown[f"{name}_starts"].max().item()), name != "kinematic" and missing
         panels.append(Panel(f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer, SHARE))
     first = shown.entrant.values[shown.best.sel(measure="physical").values == 1]
     finding = f"fewest falls over all velocities: {', '.join(first[:4])}" + " and others" * (len(first) > 4)
-    figure, axes, images = _drawn(finding, shown, panels, in_figure(from_one(shown)))
-    figure.colorbar(images[0], ax=axes[:3], location="bottom", label="share of the starts", fraction=0.03, aspect=80)
-    _dots(axes[3], shown)
+    figure, axes, images = _drawn(finding, shown, panels, in_figure(from_one(shown)), beside=1)
+    figure.colorbar(images[0], ax=axes[:-1], location="bottom", label="share of the starts", fraction=0.03, aspect=80)
+    _dots(axes[-1], shown)
     return figure
 
 
@@ -79,11 +78,13 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
     return figure
 
 
-def _drawn(finding: str, shown: "xr.Dataset", panels: list[Panel], note: str) -> "tuple[Figure, Any, list[AxesImage]]":
-    """Draw panels in a figure of four axes with a row for each entrant; return figure, axes and heat maps."""
+def _drawn(
+    finding: str, shown: "xr.Dataset", panels: list[Panel], note: str, beside: int = 0
+) -> "tuple[Figure, Any, list[AxesImage]]":
+    """Draw panels with a row for each entrant, and leave `beside` more axes empty; return figure, axes, heat maps."""
     rows, images = shown.sizes["entrant"], []
     figure = picture(10.0, 2.6 + 0.18 * rows)
-    axes = figure.subplots(1, 4, sharey=True)
+    axes = figure.subplots(1, len(panels) + beside, sharey=True)
     for ax, (title, values, colours, fewer, ends) in zip(axes, panels, strict=False):
         marks = np.where(np.isfinite(values), np.where(fewer, FEWER, ""), NOTHING)
         images.append(heat_map(ax, shown.velocity.values, values, marks, cmap=colours, **ends))

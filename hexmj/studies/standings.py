@@ -56,12 +56,12 @@ def standings(
         data: result of every cell by entrant and question.
 
     Returns:
-        Over (entrant, velocity): `kinematic`, `carried` and `physical` FLSS with `_low`, `_high` (95 % Wilson); with
-        `_above`, the FLSS minus that of the `reference` on the same starts, and its 95 % interval. For walks without a
-        fall: actual over commanded `speed`, `slip` [mm/s], `cost` of transport, highest `torque` of a joint over its
-        limit. The number of walks that failed, `missing`. For steady-state gaits: the fractions of starts that are
-        `periodic` and `stable`, the median time until it is `reached` [time units], `duty_factor` and the phases
-        `ipsilateral` and `contralateral`.
+        Over (entrant, velocity): the FLSS of `MEASURES` with `_low`, `_high` (95 % Wilson); with `_above`, the FLSS
+        minus that of the `reference` on the same starts, and its 95 % interval. For walks without a fall: actual over
+        commanded `speed`, `slip` [mm/s], `cost` of transport, highest `torque` of a joint over its limit. The number
+        of walks that failed, `missing`. For steady-state gaits: the fractions of starts that are `periodic` and
+        `stable`, the median time until it is `reached` [time units], `duty_factor` and the phases `ipsilateral` and
+        `contralateral`.
         Over entrant: `range`, J_N, and `accelerated`, with intervals. Over (entrant, measure): `best` and `worst`
         rank by the mean over velocities. Over (entrant, trial): `fell`, and kinematic `lost`, with intervals.
         The number of starts behind a frequency has the suffix `_starts`.
@@ -79,13 +79,15 @@ def standings(
     planned, walked, gaits = (
         cells(f"{kind} {v}" for v in velocities.tolist()) for kind in ("kinematic", "physics", "gait")
     )
-    events = {"kinematic": planned.lost, "carried": happened(walked.carried_loss), "physical": walked.fell}
+    events = {"kinematic": planned.lost, "physical": walked.fell}
+    events |= {measure: happened(walked[f"{measure}_loss"]) for measure in ("grounded", "carried")}
     ideal = np.array([is_ideal(*entrant) for entrant in entrants.items()])
     random = [name for name, begins in zip(names, ideal, strict=True) if not begins]
     reference = REFERENCE if REFERENCE in random else next(iter(random), "")
     table: dict[str, Any] = {}
     places = []
-    for measure, values in events.items():
+    for measure in MEASURES:
+        values = events[measure]
         same = np.where(ideal[:, None, None], np.nan, values)  # ideal starts cannot be compared pairwise
         table |= frequencies(measure, values.values, OVER_VELOCITY)
         table |= differences(f"{measure}_above", same, same[names.index(reference or names[0])], OVER_VELOCITY)
@@ -112,7 +114,7 @@ def standings(
     for phase in ("ipsilateral", "contralateral"):
         table[phase] = OVER_VELOCITY, np.apply_along_axis(_phase, 2, gaits[phase].values)
     velocity = ("velocity", velocities, VELOCITY)
-    axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(events)}
+    axes = {"entrant": names, "velocity": velocity, "trial": list(TRIALS), "measure": list(MEASURES)}
     result = xr.Dataset(table, axes, {"reference": reference})
     for name, values in result.items():
         values.attrs = {"units": UNITS.get(str(name), "1")}
@@ -150,7 +152,12 @@ WEDGED = 5.0
 times leg length: muscle forces above 50 body weights act at a tenth of the leg's length (Full & Ahn 1995, J. exp. Biol.
 198, 1285, abstract). No value for a stick insect was found."""
 
-MEASURES = {"kinematic": "Kinematic FLSS", "carried": "Carried FLSS", "physical": "Physical FLSS"}
+MEASURES = {
+    "kinematic": "Kinematic FLSS",
+    "grounded": "Grounded FLSS",
+    "carried": "Carried FLSS",
+    "physical": "Physical FLSS",
+}
 
 
 class Table(NamedTuple):

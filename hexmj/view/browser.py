@@ -246,7 +246,7 @@ class BrowserView:
 
         series = (
             uplot.Series(label="time [s]"),
-            uplot.Series(label="measured", stroke=MEASURE_STYLES["carried"]["color"], width=2),
+            uplot.Series(label="grounded", stroke=MEASURE_STYLES["grounded"]["color"], width=2),
             uplot.Series(label="planned", stroke=MEASURE_STYLES["kinematic"]["color"], width=1, dash=(4, 3)),
         )
         options: Any = {"scales": {"x": uplot.Scale(time=False)}, "aspect": 2.2}

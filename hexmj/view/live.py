@@ -13,7 +13,7 @@ from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller, Plan, SteerableController, SteerablePlan
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import OrdersFromPlan, steps_in_chunk
-from hexmj.physics.outcomes import measured_walk
+from hexmj.physics.outcomes import grounded, measured_walk
 from hexmj.physics.pushes import Push, steps_pushed
 from hexmj.physics.rollout import Chunk, Rollout, next_orders
 from hexmj.physics.settle import settle
@@ -47,11 +47,11 @@ class Moment:
     centre_of_mass: np.ndarray
     """(3,) centre of mass in the world [mm]."""
     stance: np.ndarray
-    """(leg,) True where a foot stands."""
+    """(leg,) True where a foot is at the ground."""
     planned_stance: np.ndarray
     """(leg,) True where a leg retracts in the plan."""
     margin: float
-    """Measured stability margin [mm]."""
+    """Stability margin of the feet at the ground [mm]."""
     planned_margin: float
     """Stability margin of the plan [mm]."""
 
@@ -221,7 +221,8 @@ class LiveWalk:
     def _moments(self, chunk: Chunk) -> Iterator[Moment]:
         """Yield the states of insect and plan at the ends of steps, until a fall; a chunk shows the end of the step
         before it, and not the end of its own last step."""
-        columns, walk, centre = measured_walk(chunk, self.settled)
+        columns, measured, centre, height = measured_walk(chunk, self.settled)
+        walk = grounded(measured, height, self.conditions)
         margins = walk_margin(walk, threads=1)[:, 0]
         plan = joined([self._last_step or part_of(chunk.plan, slice(1)), chunk.plan])
         self._last_step = part_of(chunk.plan, slice(-1, None))

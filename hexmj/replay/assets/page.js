@@ -24,8 +24,8 @@ function item(array, ...at) {
 class Recording {
   constructor(packed) {
     Object.assign(this, unpacked(packed));
-    this.margin = this.physical ? this.measured_margin : this.planned_margin;
-    this.stance = this.physical ? this.measured_stance : this.planned_stance;
+    this.margin = this.physical ? this.grounded_margin : this.planned_margin;
+    this.stance = this.physical ? this.grounded_stance : this.planned_stance;
     this.begin = this.seconds[0] - this.step;
     this.end = this.seconds[this.seconds.length - 1];
   }
@@ -303,7 +303,7 @@ function paper(canvas) {
 
 const FONT = 'system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
 
-/** Commanded tips (open rings) and measured ones (dots, filled in stance), with the names of the legs. */
+/** Commanded tips (open rings) and simulated ones (dots, filled in stance), with the names of the legs. */
 function drawMarks(canvas, scene, recording, pose, row, theme) {
   const draw = paper(canvas), tips = item(recording.tips, pose), planned = item(recording.planned_tips, pose);
   const centre = item(recording.centre_of_mass, pose);
@@ -330,7 +330,7 @@ function drawMarks(canvas, scene, recording, pose, row, theme) {
     draw.beginPath();
     draw.arc(u, v, 3, 0, 2 * Math.PI);
     draw.lineWidth = 1.5;
-    draw.strokeStyle = draw.fillStyle = recording.physical ? theme.css.measured : theme.css.planned;
+    draw.strokeStyle = draw.fillStyle = recording.physical ? theme.css.grounded : theme.css.planned;
     if (stands) draw.fill(); else { draw.fillStyle = theme.css.paper; draw.fill(); draw.stroke(); }
     const away = Math.hypot(u - middle[0], v - middle[1]) || 1;
     const a = u + 20 * (u - middle[0]) / away, b = v + 20 * (v - middle[1]) / away;
@@ -413,11 +413,11 @@ class Chart {
       draw.fillText(name, this.left - 8, y + leg / 2);
       draw.fillStyle = css.rule;
       draw.fillRect(this.left, y + leg - 0.5, width - this.left - this.right, 1);
-      const off = (stance) => (row) => !stance[6 * row + i] && !(stance === recording.measured_stance && Number.isNaN(recording.margin[row]));
+      const off = (stance) => (row) => !stance[6 * row + i] && !(stance === recording.grounded_stance && Number.isNaN(recording.margin[row]));
       draw.fillStyle = css.planned;
       const main = recording.physical ? 0.6 * leg : 0.8 * leg;
       if (recording.physical) this.bars(draw, off(recording.planned_stance), y + 0.72 * leg, 0.18 * leg);
-      draw.fillStyle = recording.physical ? css.measured : css.planned;
+      draw.fillStyle = recording.physical ? css.grounded : css.planned;
       this.bars(draw, off(recording.stance), y + 0.1 * leg, main - 0.05 * leg);
     });
     const known = [...recording.planned_margin, ...recording.margin].filter(Number.isFinite);
@@ -427,7 +427,7 @@ class Chart {
     Object.assign(this, { low: low - room, high: high + room });
     this.axes(draw, css, width, height);
     this.line(draw, recording.planned_margin, css.planned, [5, 3]);
-    if (recording.physical) this.line(draw, recording.margin, css.measured, []);
+    if (recording.physical) this.line(draw, recording.margin, css.grounded, []);
     this.event(draw, recording.lost, "lost", css.lost, css);
     this.event(draw, recording.fell, "fell", css.lost, css);
   }
@@ -525,7 +525,7 @@ class Chart {
 
 function themeNow() {
   const style = getComputedStyle(document.documentElement), css = {}, theme = { css };
-  for (const name of ["paper", "raised", "ink", "faint", "rule", "sky", "floor", "grid", "planned", "measured", "stable", "lost", "centre"]) {
+  for (const name of ["paper", "raised", "ink", "faint", "rule", "sky", "floor", "grid", "planned", "grounded", "stable", "lost", "centre"]) {
     css[name] = style.getPropertyValue(`--${name}`).trim();
     theme[name] = [1, 3, 5].map((at) => parseInt(css[name].slice(at, at + 2), 16) / 255);
   }
@@ -546,9 +546,9 @@ class Panel {
     this.part("world").setAttribute("aria-label", "The walk in 3D; arrow keys turn it, plus and minus zoom");
     this.part("chart").setAttribute("aria-label", "Footfall diagram and stability margin over time");
     this.part("legend").textContent = recording.physical
-      ? "bars: foot off the ground; thin: planned swing. Margin: line measured, dashes planned; hatched: outside the polygon"
+      ? "bars: foot off the ground; thin: planned swing. Margin: line grounded, dashes planned; hatched: outside the polygon"
       : "bars: planned swing. Margin: dashes planned; hatched: outside the polygon";
-    if (!recording.physical) this.root.style.setProperty("--measured", "var(--planned)");
+    if (!recording.physical) this.root.style.setProperty("--grounded", "var(--planned)");
     this.chart = new Chart(this.part("chart"), recording);
     const tips = item(recording.tips, 0), centre = item(recording.centre_of_mass, 0);
     this.size = Math.max(...[0, 1, 2, 3, 4, 5].map((leg) => Math.hypot(tips[3 * leg] - centre[0], tips[3 * leg + 1] - centre[1])));
