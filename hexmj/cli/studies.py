@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 AGREEMENT = {
-    "carried": "agreement_carried",
     "grounded": "agreement_grounded",
+    "carried": "agreement_carried",
     "physical": "agreement",
-    "same feet": "same_feet",
-    "at the ground": "same_feet_grounded",
+    "steps grounded": "same_feet_grounded",
+    "steps carried": "same_feet_carried",
 }
 """Heading -> variable: fraction of starts with the same outcome as in the plan, or of steps with the planned stance."""
 
 DEVIATION = {
-    "margin": "margin",
     "grounded": "margin_grounded",
+    "carried": "margin_carried",
     "pressure": "margin_pressure",
     "same feet": "margin_same_feet",
     "drift": "drift",
@@ -184,29 +184,33 @@ class Converge(StudyCommand):
         return lists_of(_means(result))
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        from hexmj.studies.static_limit import LOSSES
+        from hexmj.measures.compare import MEASURES
 
         means, axes = _means(result), ("leg_mass", "vp")
         yield (
             f"V = {study.velocity:g}: FLSS, with 95 % intervals; mass: of the legs, in multiples of the default;"
-            " grounded: measured with all feet near the ground; physical: falls"
+            " grounded: feet at the ground; carried: feet that carry load; physical: falls"
         )
-        yield grid(means, axes, [*LOSSES])
-        yield "Fraction of starts with the same outcome as in the plan; fraction of steps with the planned stance"
+        yield grid(means, axes, [*MEASURES])
+        yield (
+            "Fraction of starts with the same outcome as in the plan; fraction of steps in which the planned feet are"
+            " those at the ground (steps grounded), or those that carry load (steps carried)"
+        )
         yield grid(means, axes, AGREEMENT)
         yield (
-            "Mean distance [mm] from the planned margin until the plan loses stability, of four margins: measured, with"
-            " all feet at the ground (grounded), of the centre of pressure, measured while the planned feet stand (same"
-            " feet); drift of the centre of mass from O [mm]; slip [mm/s] and tracking [mm] of the whole walk"
+            "Mean distance [mm] from the planned margin until the plan loses stability, of four margins: of the feet at"
+            " the ground (grounded), of those that carry load (carried), of the centre of pressure, and carried while"
+            " the planned feet carry load (same feet); drift of the centre of mass from O [mm]; slip [mm/s] and"
+            " tracking [mm] of the whole walk"
         )
         yield grid(means, axes, DEVIATION)
 
 
 def _means(result: "xr.Dataset") -> "xr.Dataset":
     """Return the means over the starts."""
-    from hexmj.studies.static_limit import LOSSES
+    from hexmj.measures.compare import MEASURES
 
-    return result.drop_vars(LOSSES.values()).mean("start", keep_attrs=True)
+    return result.drop_vars(MEASURES.values()).mean("start", keep_attrs=True)
 
 
 class Biology(StudyCommand):

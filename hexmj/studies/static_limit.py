@@ -4,8 +4,8 @@ The same starts walk at decreasing V_p, with the mass of the insect's own legs a
 the paper, whose legs have none.
 
 If more than three feet stand, the distribution of the weight over them depends on how far the servos yield. A foot in
-stance may hover by a fiftieth of the standing height while other feet carry the weight. The hovering foot still
-supports the body, since it touches the ground as soon as the trunk sinks by that height.
+stance may hover while other feet carry the weight. The hovering foot is still at the ground (`outcomes.GROUNDED`): it
+touches the ground as soon as the trunk sinks.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.measures.compare import with_flss
+from hexmj.measures.compare import MEASURES, with_flss
 from hexmj.measures.figures import caption
 from hexmj.measures.study import Study, kept_walk
 from hexmj.measures.tables import WalkSettings, over_start
@@ -27,7 +27,6 @@ from hexmj.stability import loss_time, stability_margin, walk_margin
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration
 from hexmj.validate import distinct
-from hexmj.walks import Walk
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,24 +34,16 @@ if TYPE_CHECKING:
 
     from hexmj.measures.physical import PhysicalWalk
 
-GROUNDED = 0.05
-"""Height, as a fraction of the standing height, up to which a foot counts as standing in `grounded`. Values from 0.05
-to 0.2 change FLSS at V_p = 20 mm/s by at most 0.04 (`docs/concepts/physics.md`)."""
-
-LOSSES = {"kinematic": "planned_loss", "carried": "carried_loss", "grounded": "grounded_loss", "physical": "fall"}
-"""Measure of FLSS -> outcome, the time of the event that it counts: the measures `compare.MEASURES`, and `grounded`,
-which is `carried` with low-hovering feet counted as standing, see `grounded`."""
-
 DISTANCES = {
-    "margin": ("mm", "mean distance between measured and planned stability margin"),
-    "margin_grounded": ("mm", "mean distance between margin of all feet at the ground and planned margin"),
+    "margin_grounded": ("mm", "mean distance between margin of the feet at the ground and planned margin"),
+    "margin_carried": ("mm", "mean distance between margin of the feet that carry load and planned margin"),
     "margin_pressure": ("mm", "mean distance between margin of the centre of pressure and planned margin"),
-    "margin_same_feet": ("mm", "mean distance between measured and planned margin while the planned feet stand"),
-    "same_feet": ("1", "fraction of steps in which the planned feet stand"),
+    "margin_same_feet": ("mm", "`margin_carried` while the planned feet carry load"),
     "same_feet_grounded": ("1", "fraction of steps in which the planned feet are the feet at the ground"),
+    "same_feet_carried": ("1", "fraction of steps in which the planned feet are those that carry load"),
     "drift": ("mm", "mean distance of the centre of mass from O"),
 }
-"""Distance of a measured walk from its plan -> unit, long name. Walks count until the plan's loss or the fall."""
+"""Distance of a simulated walk from its plan -> unit, long name. Walks count until the plan's loss or the fall."""
 
 REPORTED = {"slip": "mm/s", "tracking": "mm"}
 """Field of `Outcomes` that the result contains too -> its unit."""
@@ -62,22 +53,22 @@ FINE = Conditions(longest_substep=0.5)
 
 STYLES: dict[str, dict[str, Any]] = MEASURE_STYLES | {
     "pressure": {"color": "0.55", "marker": "v", "label": "centre of pressure"},
-    "same_feet": {"color": "#e7b97c", "marker": "s", "label": "measured, while the planned feet stand"},
+    "same_feet": {"color": "#8fce8a", "marker": "D", "label": "carried, while the planned feet carry load"},
     "drift": {"color": "0.15", "marker": "o"},
 }
 """Curve -> its style."""
 
 PANELS = {
-    "share of the starts": {"carried": "carried", "grounded": "grounded", "physical": "physical"},
+    "share of the starts": {"grounded": "grounded", "carried": "carried", "physical": "physical"},
     "agreement with kinematic losses": {
-        "agreement_carried": "carried",
         "agreement_grounded": "grounded",
+        "agreement_carried": "carried",
         "agreement": "physical",
     },
     "distance from the planned margin [mm]": {
         "margin_pressure": "pressure",
-        "margin": "carried",
         "margin_grounded": "grounded",
+        "margin_carried": "carried",
         "margin_same_feet": "same_feet",
     },
     "centre of mass from O [mm]": {"drift": "drift"},
@@ -131,8 +122,8 @@ class StaticLimit(Study):
         """Return FLSS, agreement between the measures, and distances from the plan.
 
         Returns:
-            Over (leg_mass, vp): the FLSS of `LOSSES` with 95 % Wilson intervals; `agreement`, the fraction of starts
-            with a planned loss and a fall, or with neither; `agreement_carried` and `agreement_grounded`, the same for
+            Over (leg_mass, vp): the FLSS of `MEASURES` with 95 % Wilson intervals; `agreement`, the fraction of starts
+            with a planned loss and a fall, or with neither; `agreement_grounded` and `agreement_carried`, the same for
             these losses instead of the fall. Over (leg_mass, vp, start): the times of the losses and falls,
             `DISTANCES` and `REPORTED`.
         """
@@ -142,19 +133,18 @@ class StaticLimit(Study):
             leg_mass=("leg_mass", list(self.leg_masses), mass),
         )
         lost = table.planned_loss < np.inf
-        for measure in ("carried", "grounded"):
-            same, text = (table[LOSSES[measure]] < np.inf) == lost, f"kinematic and {measure} answer agree"
+        for measure in ("grounded", "carried"):
+            same, text = (table[MEASURES[measure]] < np.inf) == lost, f"kinematic and {measure} answer agree"
             table[f"agreement_{measure}"] = same.mean("start").assign_attrs(units="1", long_name=text)
         own = {"velocity": self.velocity, "duration": self.observed[1].item()}
-        return self.labelled(with_flss(table, LOSSES), "converge", **own)
+        return self.labelled(with_flss(table), "converge", **own)
 
 
 def distance_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
-    """Compute a cell of the study: the outcomes of `LOSSES`, `DISTANCES` and `REPORTED` over start."""
+    """Compute a cell of the study: the outcomes of `MEASURES`, `DISTANCES` and `REPORTED` over start."""
     walk = kept_walk(walks, walks.starts, threads=threads, progress=progress)
-    outcomes = vars(walk.outcomes) | {"grounded_loss": loss_time(grounded(walk), threads=threads)}
-    units = dict.fromkeys(LOSSES.values(), "time unit") | REPORTED
-    table = over_start({name: outcomes[name] for name in units}, units)
+    units = dict.fromkeys(MEASURES.values(), "time unit") | REPORTED
+    table = over_start({name: getattr(walk.outcomes, name) for name in units}, units)
     for name, values in distances(walk).items():
         table[name] = ("start", values, dict(zip(("units", "long_name"), DISTANCES[name], strict=True)))
     return table
@@ -165,33 +155,25 @@ def distances(walk: "PhysicalWalk") -> dict[str, np.ndarray]:
 
     With sensory feedback, the distances are measured from the plan that the legs followed.
     """
-    plan, measured, near = walk.ordered, walk.measured, grounded(walk)
+    plan, seen = walk.ordered, {"grounded": walk.grounded, "carried": walk.measured}
     compared = plan.time[:, None] < np.minimum(loss_time(plan), walk.outcomes.fall)
     planned, pressure = walk_margin(plan), pressure_margin(walk)
-    same, same_near = ((feet.stance == plan.stance).all(axis=-1) for feet in (measured, near))
+    same = {name: (feet.stance == plan.stance).all(axis=-1) for name, feet in seen.items()}
     drift = np.linalg.norm(walk.centre_of_mass[..., :2] - walk.qpos[..., :2], axis=-1)
-    touching = compared & measured.stance.any(axis=-1)  # there is no margin without a foot
+    stands = {name: compared & feet.stance.any(axis=-1) for name, feet in seen.items()}  # else there is no margin
     with np.errstate(invalid="ignore"):
-        off, off_grounded = (np.abs(walk_margin(feet) - planned) for feet in (measured, near))
-        steps = {  # values, and the steps that count, both (step, start)
-            "margin": (off, touching),
-            "margin_grounded": (off_grounded, touching),
+        off = {name: np.abs(walk_margin(feet) - planned) for name, feet in seen.items()}
+        steps = {f"margin_{name}": (values, stands[name]) for name, values in off.items()}
+        steps |= {f"same_feet_{name}": (alike, compared) for name, alike in same.items()}
+        steps |= {  # values, and the steps that count, both (step, start)
             "margin_pressure": (np.abs(pressure - planned), compared & np.isfinite(pressure)),
-            "margin_same_feet": (off, touching & same),
-            "same_feet": (same, compared),
-            "same_feet_grounded": (same_near, compared),
+            "margin_same_feet": (off["carried"], stands["carried"] & same["carried"]),
             "drift": (drift, compared),
         }
         return {
             name: np.where(counts, values, 0.0).sum(axis=0) / counts.sum(axis=0)
             for name, (values, counts) in steps.items()
         }
-
-
-def grounded(walk: "PhysicalWalk", share: float = GROUNDED) -> Walk:
-    """Return the measured walk, counting feet that hover below `share` standing heights as standing."""
-    near = walk.height <= share * walk.conditions.standing_height
-    return replace(walk.measured, stance=walk.measured.stance | near)
 
 
 def centre_of_pressure(walk: "PhysicalWalk") -> np.ndarray:
@@ -208,10 +190,10 @@ def centre_of_pressure(walk: "PhysicalWalk") -> np.ndarray:
 def pressure_margin(walk: "PhysicalWalk") -> np.ndarray:
     """Return the distance of the centre of pressure from the nearest edge of the support polygon, (step, start) [mm].
 
-    The polygon is that of all feet at the ground, see `grounded`. The centre of pressure is never outside, and when the
-    body tips over an edge, it is on that edge. NaN where the ground pushes no foot up.
+    The polygon is that of the feet at the ground. The centre of pressure is never outside, and when the body tips over
+    an edge, it is on that edge. NaN where the ground pushes no foot up.
     """
-    support, centre = grounded(walk), centre_of_pressure(walk)
+    support, centre = walk.grounded, centre_of_pressure(walk)
     known = np.isfinite(centre[..., 0])
     feet = np.where(known[..., None, None], support.feet - centre[..., None, :], 0.0)
     return np.where(known, np.abs(stability_margin(feet, support.stance & known[..., None])), np.nan)
@@ -249,12 +231,6 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
     figure.legend(handles=[*named, *black], **LEGEND, loc="outside lower center", ncols=3)
     agreement = result.agreement.isel(leg_mass=0).values
     agree = " and ".join(f"{agreement[i]:.2f} at $V_p$ = {vps[i]:g} mm/s" for i in (0, -1))
-    notes = "bars and band: 95 % intervals", f"close to ground: below {GROUNDED:g} standing heights"
-    head(
-        figure,
-        f"agreement of falls with planned losses: {agree}",
-        f"V = {result.attrs['velocity']:g}",
-        caption(result),
-        *notes,
-    )
+    finding, at = f"agreement of falls with planned losses: {agree}", f"V = {result.attrs['velocity']:g}"
+    head(figure, finding, at, caption(result), "bars and band: 95 % intervals")
     return figure
