@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.errors import InputError
-from hexmj.jitted import jitted
+from hexmj.jitted import jitted, part
 from hexmj.threads import run_blocks
 from hexmj.validate import numbers, states
 from hexmj.walks import Walk
@@ -113,40 +113,45 @@ def support_polygon(feet: ArrayLike, stance: ArrayLike) -> np.ndarray:
 
 @jitted
 def margins(feet: Any, stance: Any, margin: Any) -> None:
-    """Write the stability margins of postures, (posture, leg, 2), to `margin`, (posture,); for compiled code.
+    """Write the stability margins of postures, (posture, leg, 2), to `margin`, (posture,); for compiled code."""
+    for n in range(len(feet)):
+        margin[n] = margin_of(feet[n], stance[n])
+
+
+@part
+def margin_of(f, s):
+    """Return the stability margin of one posture, feet (leg, 2) and stance (leg,); for compiled code.
 
     Two standing feet are the ends of an edge of the polygon if all other standing feet lie on one side of their line.
     """
-    for n in range(len(feet)):
-        f, s = feet[n], stance[n]
-        nearest, inside = np.inf, True
-        for a in range(6):
-            if not s[a]:
+    nearest, inside = np.inf, True
+    for a in range(6):
+        if not s[a]:
+            continue
+        for b in range(a):
+            if not s[b]:
                 continue
-            for b in range(a):
-                if not s[b]:
-                    continue
-                ex, ey = f[b, 0] - f[a, 0], f[b, 1] - f[a, 1]
-                length = ex * ex + ey * ey
-                if length == 0.0:
-                    continue
-                left = right = False
-                for c in range(6):
-                    if s[c]:
-                        along_y, along_x = ex * (f[c, 1] - f[a, 1]), ey * (f[c, 0] - f[a, 0])
-                        error = ROUNDING * (abs(along_y) + abs(along_x))
-                        left |= along_y - along_x > error
-                        right |= along_x - along_y > error
-                if left and right:
-                    continue
-                side = ey * f[a, 0] - ex * f[a, 1]  # on which the centre of mass lies
-                inside &= (left and side > 0.0) or (right and side < 0.0)
-                along = -(f[a, 0] * ex + f[a, 1] * ey) / length
-                along = min(max(along, 0.0), 1.0)
-                nearest = min(nearest, np.hypot(f[a, 0] + along * ex, f[a, 1] + along * ey))
-        if nearest == np.inf:  # all standing feet are at one point
-            inside = False
-            for a in range(6):
-                if s[a]:
-                    nearest = np.hypot(f[a, 0], f[a, 1])
-        margin[n] = nearest if inside else -nearest
+            ex, ey = f[b, 0] - f[a, 0], f[b, 1] - f[a, 1]
+            length = ex * ex + ey * ey
+            if length == 0.0:
+                continue
+            left = right = False
+            for c in range(6):
+                if s[c]:
+                    along_y, along_x = ex * (f[c, 1] - f[a, 1]), ey * (f[c, 0] - f[a, 0])
+                    error = ROUNDING * (abs(along_y) + abs(along_x))
+                    left |= along_y - along_x > error
+                    right |= along_x - along_y > error
+            if left and right:
+                continue
+            side = ey * f[a, 0] - ex * f[a, 1]  # on which the centre of mass lies
+            inside &= (left and side > 0.0) or (right and side < 0.0)
+            along = -(f[a, 0] * ex + f[a, 1] * ey) / length
+            along = min(max(along, 0.0), 1.0)
+            nearest = min(nearest, np.hypot(f[a, 0] + along * ex, f[a, 1] + along * ey))
+    if nearest == np.inf:  # all standing feet are at one point
+        inside = False
+        for a in range(6):
+            if s[a]:
+                nearest = np.hypot(f[a, 0], f[a, 1])
+    return nearest if inside else -nearest

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from hexmj.cli.command import Answer, Command, StudyCommand, filmed
-from hexmj.cli.measures import PHYSICAL
-from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules, no_effect, option_fields
+from hexmj.cli.measures import check_measure
+from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules, option_fields
 from hexmj.cli.output import interval, report_checks, table
 from hexmj.errors import InputError
 from hexmj.timing import Stride
@@ -156,8 +156,6 @@ class SearchOptions:
     """Parameters that are searched. Of the 1998 network: nine (hws), ten with a neutral position that depends on the
     velocity (ldvs), 29 with mirror symmetry (mirrored), or all 58 weights (general). With the name of a controller of
     your own (mine.py:Mine): its float fields."""
-    physical: bool = False
-    """Minimise falls of the insect in MuJoCo instead of losses of the planned stability."""
     begin: str | None = None
     """Controller that gives the first population's parameters, the order of updates and the model variant. By default
     the paper's '0'-individual (evolution), the middle of the domain (cmaes), or the defaults of your own controller."""
@@ -190,7 +188,7 @@ class Search(Command):
         lines = [
             title(problem, effort),
             table(("parameter", *result.vectors), numbers),
-            f"FLSS on {effort.verdict_starts} fresh starts (seed {effort.verdict_seed}), with 95 % intervals",
+            f"{result.problem.frequency} on {effort.verdict_starts} fresh starts (seed {effort.verdict_seed}), with 95 % intervals",
             table(("controller", *(f"observation time {time.removesuffix('.0')}" for time in times)), judged),
             *result.found.report(problem),
         ]
@@ -204,12 +202,11 @@ class Search(Command):
 
         if not 1 <= len(given.velocity) <= 2:
             raise InputError(f"--velocity = {given.velocity}; expected one velocity, or the two ends of a range")
-        if not given.physical:
-            no_effect(given, PHYSICAL, "without --physical")
+        check_measure(given)
         effort = build(Effort, given)
         own: dict[str, Any] = {"form": named_form(given.form, effort.beginning, **network_rules(given))}
         own |= {"low": given.velocity[0], "high": given.velocity[-1]}
-        return build(Problem, given, **own, **({} if given.physical else {"conditions": None})), effort
+        return build(Problem, given, **own), effort
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from hexmj.cli.options import Figures, Output, Planning, Threads, build, control
 from hexmj.cli.output import Column, four_digits, grid, report_line
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
+from hexmj.measures.tables import Measure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,6 +38,9 @@ both, kin., phys., none: starts with both, only a loss, only a fall, neither"""
 """Lines that explain the tables of `hexmj compare`."""
 
 TOPPLED = "toppled: the trunk tilts by more than 0.1 rad"
+
+DYNAMIC = ("vp", "standing_height")
+"""Options of `PHYSICAL` on which the dynamic measure depends."""
 
 TIMES = ("planned loss", "grounded loss", "carried loss", "fall")
 """Entries of a walk's summary that are times [time units]; infinity says that the event does not happen."""
@@ -86,41 +90,43 @@ class FlssOptions:
 
     controller: Controller
     n_starts: int | None = None
-    """Number of random starts; by default 7000 (seven samples of 1000, as in the paper), or 200 with --physical."""
+    """Number of random starts; by default 7000 (seven samples of 1000, as in the paper), or 200 in physical walks."""
     out: Path | None = None
     """Folder for figure, NetCDF, manifest and cached results; by default nothing is saved."""
-    physical: bool = False
-    """Count falls of the insect in MuJoCo instead of losses of the planned stability."""
+    measure: Measure = "kinematic"
+    """Count losses of the planned static stability (kinematic), of the planned dynamic stability (dynamic), or falls of
+    the insect in MuJoCo (physical)."""
     range_of: int | None = None
     """Number of starts that are computed and cached together, by default 1600000; results do not depend on it."""
     conditions: Conditions = Conditions()
 
 
 class Flss(StudyCommand):
-    """Measure the kinematic or physical FLSS (frequency of the loss of static stability) of a controller at one or more
-    velocities. Without --out, nothing is saved; with it, repeat the command to resume a stopped run."""
+    """Measure the frequency with which a controller loses static stability (FLSS), loses dynamic stability (FLDS) or
+    falls, at one or more velocities. Without --out, nothing is saved; with it, repeat the command to resume a stopped
+    run."""
 
     study = "measures.kinematic:KinematicFlss"
     own = (FlssOptions,)
     defaults = {"out": None}  # noqa: RUF012
     data = "flss.nc"
     figures = {"flss": "flss"}  # noqa: RUF012
-    examples = ("--velocity 0.5", "--physical --velocity 0.3 0.5 --starts 50 --out results/flss")
+    examples = ("--velocity 0.5", "--measure dynamic --vp 80", "--measure physical --starts 50 --out results/flss")
 
     def build(self, given: SimpleNamespace) -> Any:
-        if not given.physical:
-            no_effect(given, [*PHYSICAL, "feedback"], "without --physical")
+        check_measure(given)
+        if given.measure != "physical":
             return super().build(given)
         from hexmj.measures.compare import PhysicalFlss
 
-        no_effect(given, ["range_of"], "with --physical", {"range_of": None})
+        no_effect(given, ["range_of"], "with --measure physical", {"range_of": None})
         planned = controller(given, given.controller)
         return build(PhysicalFlss, given, controllers={planned.name: planned})
 
     def result(self, given: SimpleNamespace, study: Any) -> "xr.Dataset":
         from hexmj.io import attributes
 
-        own = {"model": given.controller, "physical": given.physical}
+        own = {"model": given.controller, "measure": given.measure}
         return super().result(given, study).assign_attrs(attributes(own))
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
@@ -133,14 +139,22 @@ class Flss(StudyCommand):
         from hexmj.measures.compare import physical_report
 
         columns: Any = {name: _four_digits(name) for name in _over_velocity(result) if result[name].notnull().any()}
-        physical = "fall" in result
-        yield f"{'physical' if physical else 'kinematic'} FLSS of {result.attrs['model']}"
+        measure = result.attrs["measure"]
+        yield f"{measure} {'FLDS' if measure == 'dynamic' else 'FLSS'} of {result.attrs['model']}"
         yield grid(result, ("velocity",), columns)
         spread = "; sample sd: standard deviation over samples of 1000 starts" if "sample_sd" in columns else ""
         yield f"low, high: 95 % interval; duration: observation time [time units]{spread}"
-        if physical:
+        if measure == "physical":
             yield TOPPLED
             yield report_line(physical_report(result))
+
+
+def check_measure(given: SimpleNamespace) -> None:
+    """Raise InputError if an option is set that has no effect on the measure of --measure."""
+    if given.measure != "physical":
+        used = DYNAMIC if given.measure == "dynamic" else ()
+        names = [name for name in (*PHYSICAL, "feedback") if name not in used]
+        no_effect(given, names, f"with --measure {given.measure}")
 
 
 def _over_velocity(result: "xr.Dataset") -> list[str]:

@@ -22,8 +22,9 @@ class Plan(Protocol):
     """The walk of many independent starts, planned step by step.
 
     A plan that sets the height of the feet may have an attribute `made_for`, the `Conditions` it is made for; physical
-    walks under other conditions then raise InputError. A plan may have a method `first_losses(steps)`, which is called
-    once, at time 0, and gives the result of `planning.planned_losses` faster.
+    walks under other conditions then raise InputError. A plan may have methods `first_losses(steps)` and
+    `first_tips(steps, pendulum)`; one of them is called once, at time 0, and gives the result of
+    `planning.planned_losses` or `planned_tips` faster.
     """
 
     starts: np.ndarray

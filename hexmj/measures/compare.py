@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 MEASURES = {
     "kinematic": "planned_loss",
+    "dynamic": "dynamic_loss",
     "grounded": "grounded_loss",
     "carried": "carried_loss",
     "physical": "fall",

@@ -58,8 +58,7 @@ def caption(result: "xr.Dataset", least: int | None = None) -> str:
     changed = {name: value for name, value in stride.items() if value != default.get(name, value)}
     words.append("other lines of the tips" if changed.pop("geometry", None) else "")
     words.append(", ".join(_term(name, value) for name, value in changed.items()))
-    if recorded.get("physical", True):
-        given = recorded.get("conditions") or {}
+    if given := recorded.get("conditions") or {}:
         shown = {"vp", *unusual(given)}
         words.append(", ".join(_term(name, value) for name, value in given.items() if name in shown))
     if least not in (None, result.attrs.get("starts")):
@@ -121,14 +120,18 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
 
 
 def flss_figure(result: "xr.Dataset") -> "Figure":
-    """Draw a result of `flss` or `physical_flss`: FLSS against velocity with 95 % intervals."""
-    kind, label = ("physical", "frequency of falls") if "fall" in result else ("kinematic", "kinematic FLSS")
-    figure, data = picture(7.0, 4.4), result.rename(low="flss_low", high="flss_high").sortby("velocity")
+    """Draw a result of `flss`, `flds` or `physical_flss`: the frequency against velocity with 95 % intervals."""
+    name, measure, label = "flss", "kinematic", "kinematic FLSS"
+    if "flds" in result:
+        name, measure, label = "flds", "dynamic", "FLDS"
+    elif "fall" in result:
+        measure, label = "physical", "frequency of falls"
+    figure, data = picture(7.0, 4.4), result.rename(low=f"{name}_low", high=f"{name}_high").sortby("velocity")
     axes = figure.subplots()
-    frequency_curve(axes, data.velocity, data, "flss", **MEASURE_STYLES[kind])
+    frequency_curve(axes, data.velocity, data, name, **MEASURE_STYLES[measure])
     flss_axes(axes, result.velocity.values, label)
     ends = (data.isel(velocity=i) for i in [0, -1][: data.sizes["velocity"]])
-    values = " and ".join(f"{end.flss:.2f} at V = {end.velocity:g}" for end in ends)
+    values = " and ".join(f"{end[name]:.2f} at V = {end.velocity:g}" for end in ends)
     head(figure, f"the {label} is {values}", caption(result), "bars: 95 % intervals")
     return figure
 

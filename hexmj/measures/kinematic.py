@@ -1,17 +1,20 @@
-"""The kinematic measure (paper, Section 3): planned walks, their first losses of static stability, and FLSS."""
+"""Measures of the plan: FLSS (paper, Section 3), from the first losses of static stability of planned walks, and FLDS.
+
+FLDS is the frequency of the loss of dynamic stability, see `tipping`.  It depends on V_p and on the standing height.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import advanced, begin, check_velocities, first_losses
+from hexmj.controllers.planning import advanced, begin, check_velocities, first_losses, first_tips
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.io import attributes
@@ -21,7 +24,8 @@ from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs
 from hexmj.stats import wilson_interval
 from hexmj.sweep import Cell, Execution, run_study
 from hexmj.timing import Acceleration, Stride, observation_duration, steps_within
-from hexmj.validate import number, whole
+from hexmj.tipping import Pendulum
+from hexmj.validate import choice, number, whole
 from hexmj.walks import PlannedWalk
 
 if TYPE_CHECKING:
@@ -31,6 +35,9 @@ RANGE = 1600 * SAMPLE
 """Default number of starts in a cell, which takes one core seconds to minutes."""
 
 STRIDE = Stride()
+
+Planned = Literal["kinematic", "dynamic"]
+"""Measures that need no body, see `tables.Measure`."""
 
 
 def walk(
@@ -76,16 +83,57 @@ def first_loss(
     The arguments are those of `walk`; `duration` may also be (start,). The walks are not kept in memory.
     """
     plan = begin(controller, starts, velocity, stride, acceleration, threads)
-    steps, count = steps_within(duration, stride), len(plan.starts)
-    if steps.shape not in ((), (count,)):
-        raise InputError(f"duration has the shape {steps.shape}; expected one number or ({count},)")
-    lost = first_losses(plan, steps, threads)
-    return np.where(lost > 0, lost * stride.dt, np.inf)
+    return _times(first_losses(plan, _steps(duration, plan.starts, stride), threads), stride)
+
+
+class DynamicLosses(NamedTuple):
+    """What each start loses in its planned walk; the walk is followed up to the loss of dynamic stability."""
+
+    static: np.ndarray
+    """(start,) time of the first loss of static stability (Eq. 7) [time units]; inf without a loss."""
+    dynamic: np.ndarray
+    """(start,) time of the loss of dynamic stability [time units]; inf without a loss."""
+    excursion: np.ndarray
+    """(start,) greatest excursion z of the pendulum [mm]; 0 without a loss of static stability."""
+
+
+def dynamic_losses(
+    starts: ArrayLike,
+    controller: Controller,
+    velocity: ArrayLike,
+    duration: ArrayLike,
+    *,
+    conditions: Conditions = Conditions(),
+    stride: Stride = STRIDE,
+    acceleration: Acceleration | None = None,
+    threads: int | None = None,
+) -> DynamicLosses:
+    """Return the first losses of static and of dynamic stability of planned walks, see `tipping`.
+
+    Of the conditions only V_p and the standing height have an effect. The other arguments are those of `first_loss`.
+    """
+    plan = begin(controller, starts, velocity, stride, acceleration, threads)
+    pendulum = Pendulum.of(conditions.standing_height, conditions.seconds(stride))
+    tips = first_tips(plan, _steps(duration, plan.starts, stride), pendulum, threads)
+    return DynamicLosses(_times(tips.lost, stride), _times(tips.tipped, stride), tips.excursion)
+
+
+def _steps(duration: ArrayLike, starts: np.ndarray, stride: Stride) -> np.ndarray:
+    """Return the number of steps within the duration, () or (start,), after a check of its shape."""
+    steps = steps_within(duration, stride)
+    if steps.shape not in ((), (len(starts),)):
+        raise InputError(f"duration has the shape {steps.shape}; expected one number or ({len(starts)},)")
+    return steps
+
+
+def _times(steps: np.ndarray, stride: Stride) -> np.ndarray:
+    """Return the times at which steps end [time units]; inf for step 0."""
+    return np.where(steps > 0, steps * stride.dt, np.inf)
 
 
 @dataclass(frozen=True)
 class KinematicFlss:
-    """Kinematic FLSS of a controller, with a cell for each velocity and range of starts.
+    """FLSS or FLDS of a controller's plan, with a cell for each velocity and range of starts.
 
     The ranges divide the seed's sequence of random starts. Losses are counted for each sample of 1000 starts of that
     sequence, so that the result does not depend on the size of the ranges.
@@ -106,10 +154,15 @@ class KinematicFlss:
     """The accelerating procedure of Eq. 11; without it the velocity is constant."""
     range_of: int = RANGE
     """Number of starts that one cell counts; the last cell may have fewer."""
+    measure: Planned = "kinematic"
+    """Count losses of static (kinematic) or of dynamic stability."""
+    conditions: Conditions = Conditions()
+    """Conditions of the dynamic measure, on which V_p and the standing height have an effect."""
 
     def __post_init__(self) -> None:
         settings_of(self.controller)  # raises InputError now rather than after the computation
         check_draw(self.n_starts, self.seed)
+        choice("measure", self.measure, get_args(Planned))
         whole("range_of", self.range_of, 1, MOST_STARTS)
         _ = self.observed
 
@@ -129,27 +182,36 @@ class KinematicFlss:
         cells = []
         for i, first in self.places:
             (v, duration), count = np.transpose(self.observed)[i], min(self.range_of, self.n_starts - first)
-            same = self.seed, Conditions(), self.stride, self.acceleration
+            same = self.seed, self.conditions, self.stride, self.acceleration
             walks = WalkSettings(self.controller, v, duration, count, *same)
             name = f"{self.controller.name}-V-{v:g}-from-{first}"
-            cells.append(Cell(name, losses_of_range, {"walks": walks, "first": first}, walks.work))
+            cells.append(
+                Cell(name, losses_of_range, {"walks": walks, "first": first, "measure": self.measure}, walks.work)
+            )
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return the dataset that `flss` describes, from the datasets of all cells."""
+        """Return the dataset that `flss` or `flds` describes, from the datasets of all cells."""
         losses = np.zeros((len(self.velocities), math.ceil(self.n_starts / SAMPLE)), dtype=int)
         for (i, first), counted in zip(self.places, data, strict=True):
             begin = first // SAMPLE
             losses[i, begin : begin + counted.sizes["sample"]] += counted.losses.values
         walks = self.observation_time, self.n_starts, self.seed, self.stride, self.acceleration
         made = {"study": "flss"} | settings({self.controller.name: self.controller}, *walks)
-        return frequency_table(losses, self.n_starts, *self.observed).assign_attrs(attributes(made))
+        if self.measure == "dynamic":
+            made |= {"conditions": self.conditions.settings()}
+        table = frequency_table(losses, self.n_starts, *self.observed, self.measure)
+        return table.assign_attrs(attributes(made))
 
 
 def losses_of_range(
-    walks: WalkSettings, first: int, threads: int | None = None, progress: Progress | None = None
+    walks: WalkSettings,
+    first: int,
+    measure: Planned = "kinematic",
+    threads: int | None = None,
+    progress: Progress | None = None,
 ) -> "xr.Dataset":
-    """Count losses of static stability among `walks.n_starts` starts, of which the first has the index `first`.
+    """Count losses of stability among `walks.n_starts` starts, of which the first has the index `first`.
 
     Returns:
         `losses`, (sample,), in samples of 1000 starts of the seed; the first and the last sample may be incomplete.
@@ -160,13 +222,17 @@ def losses_of_range(
     losses = np.zeros(math.ceil((first + walks.n_starts) / SAMPLE) - begin, dtype=int)
     how: Any = {"stride": walks.stride, "acceleration": walks.acceleration, "threads": threads}
     for x in draw_slabs(walks.n_starts, walks.seed, walks.stride, first):
-        times = first_loss(x, walks.controller, walks.velocity, walks.duration, **how)
+        arguments = x, walks.controller, walks.velocity, walks.duration
+        if measure == "dynamic":
+            times = dynamic_losses(*arguments, conditions=walks.conditions, **how).dynamic
+        else:
+            times = first_loss(*arguments, **how)
         count = losses_by_sample(np.isfinite(times)[None], first)[0]
         losses[first // SAMPLE - begin :][: len(count)] += count
         first += len(x)
         if progress:
             progress(len(x) / walks.n_starts)
-    return xr.Dataset({"losses": ("sample", losses, {"units": "1", "long_name": "starts that lose static stability"})})
+    return xr.Dataset({"losses": ("sample", losses, {"units": "1", "long_name": f"starts with a {measure} loss"})})
 
 
 def flss(
@@ -206,6 +272,39 @@ def flss(
     several: Any = np.atleast_1d(velocities).tolist()
     walks = n_starts, observation_time, seed, stride, acceleration
     return run_study(KinematicFlss(controller, several, *walks, range_of), folder, **how)
+
+
+def flds(
+    controller: Controller,
+    velocities: Sequence[float] | float,
+    *,
+    conditions: Conditions = Conditions(),
+    n_starts: int = KinematicFlss.n_starts,
+    observation_time: str | float = KinematicFlss.observation_time,
+    seed: int = KinematicFlss.seed,
+    stride: Stride = STRIDE,
+    acceleration: Acceleration | None = None,
+    range_of: int = RANGE,
+    folder: Path | None = None,
+    **how: Unpack[Execution],
+) -> "xr.Dataset":
+    """Return the FLDS, the frequency of the loss of dynamic stability, at each velocity, over the same starts.
+
+    Args:
+        controller: controller that plans the walks.
+        velocities: one or several V_r, each 0 <= V < 1; the final velocities when accelerating.
+        conditions: V_p and standing height, from which the pendulum follows, see `tipping`; the others have no effect.
+        n_starts: this and all other arguments as for `flss`.
+
+    Returns:
+        The variables of `flss`, with `flds` in place of `flss`.
+
+    Raises:
+        InputError: an argument is out of range.
+    """
+    several: Any = np.atleast_1d(velocities).tolist()
+    walks = n_starts, observation_time, seed, stride, acceleration
+    return run_study(KinematicFlss(controller, several, *walks, range_of, "dynamic", conditions), folder, **how)
 
 
 def flss_over_range(

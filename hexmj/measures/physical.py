@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import advanced, begin, check_same
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
-from hexmj.measures.kinematic import first_loss
+from hexmj.measures.kinematic import dynamic_losses
 from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar, WalkSoFar, grounded
 from hexmj.physics.pushes import Push
 from hexmj.physics.rollout import drive
@@ -164,8 +164,9 @@ def physical_outcomes(
     starts, stride = settled.starts, settled.stride
     plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
     walks: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
-    lost = first_loss(starts, controller, velocity, duration, **walks)
-    return outcomes_of_plan(settled, plan, duration, lost, effort=effort, threads=threads, progress=progress)
+    lost = dynamic_losses(starts, controller, velocity, duration, conditions=settled.conditions, **walks)
+    how: Any = {"effort": effort, "threads": threads, "progress": progress}
+    return outcomes_of_plan(settled, plan, duration, lost.static, lost.dynamic, **how)
 
 
 def outcomes_of_plan(
@@ -173,6 +174,7 @@ def outcomes_of_plan(
     plan: Plan,
     duration: float,
     planned_loss: np.ndarray,
+    dynamic_loss: np.ndarray | None = None,
     *,
     push: Push | None = None,
     effort: EffortSoFar | None = None,
@@ -180,7 +182,7 @@ def outcomes_of_plan(
     progress: Progress | None = None,
 ) -> Outcomes:
     """Return the outcomes of the physical walks of a plan at time 0, whose planned losses, (start,), are known."""
-    so_far = OutcomesSoFar(settled, planned_loss)
+    so_far = OutcomesSoFar(settled, planned_loss, dynamic_loss)
     for chunk in drive(settled, plan, duration, push=push, threads=threads, progress=progress):
         so_far.add(chunk)
         if effort:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -25,6 +25,9 @@ PERIODS = 40
 
 VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
 """Attributes of the coordinate `velocity`."""
+
+Measure = Literal["kinematic", "dynamic", "physical"]
+"""What counts as a loss: static (kinematic) or dynamic stability of the plan, or a fall of the body (physical)."""
 
 Dims = tuple[str, ...]
 
@@ -130,16 +133,22 @@ def losses_by_sample(lost: np.ndarray, first: int = 0) -> np.ndarray:
     return np.add.reduceat(lost, begin, axis=1, dtype=int)
 
 
-def frequency_table(losses: np.ndarray, n_starts: int, velocities: np.ndarray, duration: np.ndarray) -> "xr.Dataset":
-    """Return FLSS with its 95 % interval over velocity, from the losses in each sample, (velocity, sample)."""
+def frequency_table(
+    losses: np.ndarray, n_starts: int, velocities: np.ndarray, duration: np.ndarray, measure: str = "kinematic"
+) -> "xr.Dataset":
+    """Return FLSS, or FLDS if the measure is dynamic, over velocity, from the losses in each sample.
+
+    `losses` is (velocity, sample); the table also has the 95 % interval and the spread of the samples.
+    """
     import xarray as xr
 
+    name, kind = ("flds", "dynamic") if measure == "dynamic" else ("flss", "static")
     total = losses.sum(axis=1)
     low, high = wilson_intervals(total, n_starts)
     samples = losses[:, : n_starts // SAMPLE] / SAMPLE
     spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(total), np.nan)
     columns = {
-        "flss": (total / n_starts, "frequency of the loss of static stability"),
+        name: (total / n_starts, f"frequency of the loss of {kind} stability"),
         "low": (low, "lower end of the 95 % Wilson interval"),
         "high": (high, "upper end of the 95 % Wilson interval"),
         "sample_sd": (spread, "standard deviation over samples of 1000 starts"),

@@ -12,7 +12,8 @@ from hexmj.physics.foot_path import steps_in_chunk
 from hexmj.physics.rollout import Chunk
 from hexmj.physics.settle import Settled
 from hexmj.rotations import lowest, matrix
-from hexmj.stability import loss_time
+from hexmj.stability import loss_time, walk_margin
+from hexmj.tipping import Pendulum, TipsSoFar
 from hexmj.walks import PlannedWalk, Walk
 
 TOPPLED = 0.1
@@ -34,6 +35,8 @@ class Outcomes:
 
     planned_loss: np.ndarray
     """(start,) first loss of static stability of the plan: planned stance, centre of mass at O [time units]."""
+    dynamic_loss: np.ndarray
+    """(start,) loss of dynamic stability of the plan, see `tipping` [time units]; NaN if it is not computed."""
     grounded_loss: np.ndarray
     """(start,) first loss of static stability: feet at the ground, the body's own centre of mass [time units]."""
     carried_loss: np.ndarray
@@ -94,10 +97,11 @@ class _Sums(NamedTuple):
 class OutcomesSoFar:
     """Adds up the outcomes of all starts, chunk by chunk."""
 
-    def __init__(self, settled: Settled, planned_loss: np.ndarray) -> None:
-        """Begin with the times of the plan's first losses of stability, (start,) [time units]."""
+    def __init__(self, settled: Settled, planned_loss: np.ndarray, dynamic_loss: np.ndarray | None = None) -> None:
+        """Begin with the times of the plan's losses of static and dynamic stability, (start,) [time units]."""
         size, compiled, lengths = len(settled.starts), settled.compiled, settled.conditions.body.lengths
         self._settled, self._planned_loss = settled, planned_loss
+        self._dynamic_loss = np.full(size, np.nan) if dynamic_loss is None else dynamic_loss
         self._grounded_loss, self._carried_loss, self._fall = np.full((3, size), np.inf)
         self._fall_part, self._unreachable = np.full(size, -1), np.zeros(size, dtype=int)
         self._walked, self._commanded, self._depth = np.zeros((3, size))
@@ -150,6 +154,7 @@ class OutcomesSoFar:
             saturation = sums.saturated / (sums.shown * len(compiled.torque_limits))
         found = Outcomes(
             planned_loss=self._planned_loss,
+            dynamic_loss=self._dynamic_loss,
             grounded_loss=self._grounded_loss,
             carried_loss=self._carried_loss,
             fall=self._fall,
@@ -180,7 +185,11 @@ class WalkSoFar(OutcomesSoFar):
 
     def __init__(self, settled: Settled, planned: PlannedWalk, threads: int | None = None) -> None:
         """Begin with the plan of the whole walk; a body with sensors of the feet's forces also stores forces."""
-        super().__init__(settled, loss_time(planned, threads=threads))
+        pendulum = Pendulum.of(settled.conditions.standing_height, settled.conditions.seconds(settled.stride))
+        so_far = TipsSoFar(pendulum, len(settled.starts))
+        so_far.add(walk_margin(planned, threads), np.full(len(settled.starts), len(planned.time)))
+        lost, tipped, _ = so_far.tips
+        super().__init__(settled, *(np.where(step > 0, step * settled.stride.dt, np.inf) for step in (lost, tipped)))
         shape, compiled = planned.stance.shape, settled.compiled
         axes = {"height": (6,), "load": (6,), "qpos": (compiled.model.nq,), "centre_of_mass": (3,)}
         if compiled.columns.feet_push.stop > compiled.columns.feet_push.start:

@@ -11,8 +11,8 @@ from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, OutOfReach, Refused, SimulationError
-from hexmj.measures.kinematic import first_loss
-from hexmj.measures.tables import columns, observed
+from hexmj.measures.kinematic import dynamic_losses, first_loss
+from hexmj.measures.tables import Measure, columns, observed
 from hexmj.plain import plain
 from hexmj.progress import Progress, part_of
 from hexmj.search.algorithms import Domain
@@ -38,7 +38,7 @@ Ties = Literal["equal", "later"]
 
 @dataclass(frozen=True)
 class Problem:
-    """A cost function G of a form's parameters: the FLSS I_N^t of Eq. 9 or J_N^t of Eq. 10."""
+    """A cost function G of a form's parameters: the FLSS I_N^t of Eq. 9 or J_N^t of Eq. 10, or the FLDS likewise."""
 
     form: Form
     """Form that defines the free parameters."""
@@ -52,8 +52,10 @@ class Problem:
     """Step range, lines along which the tips move, and time step."""
     acceleration: Acceleration | None = None
     """Accelerate from V_r(0) to the velocity by Eq. 11; by default, walk at the velocity from time 0 on."""
-    conditions: Conditions | None = None
-    """Conditions of physical walks, in which falls count; None counts losses of stability in kinematic walks."""
+    measure: Measure = "kinematic"
+    """Losses that count: of the plan's static (kinematic) or dynamic stability, or falls of the body (physical)."""
+    conditions: Conditions = Conditions()
+    """Conditions of physical walks; of the dynamic measure, V_p and the standing height."""
     feedback: bool = False
     """Let candidates use sensory feedback, which needs physical walks."""
     over: Over = "usual"
@@ -64,17 +66,22 @@ class Problem:
     search in which all starts lose stability."""
 
     def __post_init__(self) -> None:
+        choice("measure", self.measure, get_args(Measure))
         choice("over", self.over, get_args(Over))
         choice("ties", self.ties, get_args(Ties))
         if self.low > self.high:
             raise InputError(f"velocity range {self.low} to {self.high}; expected the lower velocity first")
         observed(sorted({self.low, self.high}), self.observation_time, self.stride, self.acceleration)
-        if self.feedback and not self.conditions:
-            raise InputError("feedback = True needs physical walks, but conditions = None")
-        if self.conditions:
-            check_ground(self.conditions)
+        if self.feedback and not self.physical:
+            raise InputError(f"feedback = True needs measure = 'physical', but it is {self.measure!r}")
+        check_ground(self.conditions)
         if self.over != "usual" and not isinstance(self.form, NetworkForm):
             raise InputError(f"over = {self.over!r} needs a form of the 1998 network (NetworkForm)")
+
+    @property
+    def physical(self) -> bool:
+        """Whether bodies walk."""
+        return self.measure == "physical"
 
     @property
     def observation_times(self) -> list[str | float]:
@@ -97,20 +104,25 @@ class Problem:
         return SensoryFeedback(controller) if self.feedback else controller
 
     @property
+    def frequency(self) -> str:
+        """Name of the frequency of losses."""
+        return "FLDS" if self.measure == "dynamic" else "FLSS"
+
+    @property
     def minimised(self) -> str:
         """Description of the cost."""
-        lost = "that fell" if self.conditions else "lost"
+        lost = "that fell" if self.physical else "lost"
         later = f"(starts {lost} + mean part of the time lost) / (starts + 1)"
-        cost = later if self.ties == "later" else "FLSS"
+        cost = later if self.ties == "later" else self.frequency
         names = {"usual": cost, "mean": f"mean over variants of {cost}", "worst": f"greatest {cost} of all variants"}
         return names[self.over]
 
     def settings(self) -> dict[str, Any]:
         """Return the problem as plain data."""
-        names = "form", "low", "high", "observation_time", "feedback", "over", "ties"
+        names = "form", "low", "high", "observation_time", "measure", "feedback", "over", "ties"
         own = {name: plain(getattr(self, name)) for name in names}
         own |= {"stride": asdict(self.stride), "acceleration": self.acceleration and asdict(self.acceleration)}
-        return own | {"conditions": self.conditions and self.conditions.settings()}
+        return own | {"conditions": self.conditions.settings()}
 
 
 @dataclass(frozen=True)
@@ -132,7 +144,7 @@ class Sample:
             form, stride = varied(problem.form, name), varied(problem.stride, name)
             return replace(self, problem=replace(problem, form=form, stride=stride, over="usual"))
 
-        return {name: under(name) for name in variants(physical=problem.conditions is not None)}
+        return {name: under(name) for name in variants(physical=problem.physical)}
 
     @cached_property
     def starts(self) -> np.ndarray:
@@ -153,7 +165,7 @@ class Sample:
         from hexmj.physics.settle import settle
 
         for one in self.variants.values():
-            if one.problem.conditions and not one._settled:
+            if one.problem.physical and not one._settled:
                 one._settled.append(settle(one.starts, one.problem.conditions, one.problem.stride, threads))
 
     def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
@@ -227,11 +239,14 @@ class Sample:
         times = [observation_duration(time, self.velocity, p.stride, p.acceleration) for time in observation_times]
         ends = np.array([steps_within(time, p.stride) for time in times]) * dt
         longest, how = ends.max(axis=0), {"acceleration": p.acceleration, "threads": threads}
-        if p.conditions:
+        if p.physical:
             from hexmj.measures.physical import physical_outcomes
 
             (settled,) = self._settled
             lost = physical_outcomes(settled, controller, self.velocity, float(longest.max()), **how).fall
+        elif p.measure == "dynamic":
+            walks = self.starts, controller, self.velocity, longest
+            lost = dynamic_losses(*walks, conditions=p.conditions, stride=p.stride, **how).dynamic
         else:
             lost = first_loss(self.starts, controller, self.velocity, longest, stride=p.stride, **how)
         return lost, ends + 1e-6 * dt

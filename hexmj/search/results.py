@@ -95,7 +95,7 @@ def run_search(
         InputError: a setting is invalid, `verdict_seed` is the seed of an involved search, or a controller cannot walk.
         SimulationError: a simulation fails.
     """
-    effort = effort.completed(physical=problem.conditions is not None)
+    effort = effort.completed(physical=problem.physical)
     earlier = _earlier_seeds(problem, effort)
     if effort.verdict_seed in {effort.seed, *earlier}:
         used = f"{sorted({effort.seed, *earlier})}, the seeds of this search and of earlier ones"
@@ -124,9 +124,8 @@ def title(problem: Problem, effort: Effort) -> str:
     at = f"V = {problem.low:g}" if problem.low == problem.high else f"V from {problem.low:g} to {problem.high:g}"
     at += f", {problem.over} of all variants" if problem.over != "usual" else ""
     at += ", later losses first among equals" if problem.ties == "later" else ""
-    kind = "physical" if problem.conditions else "kinematic"
     method = f"observation time {problem.observation_time}, {effort.algorithm}, seed {effort.seed}"
-    return f"{problem.form.name}, {kind} FLSS at {at}, {method}"
+    return f"{problem.form.name}, {problem.measure} {problem.frequency} at {at}, {method}"
 
 
 def _earlier_seeds(problem: Problem, effort: Effort) -> set[int]:
@@ -165,6 +164,9 @@ def _controller_toml(problem: Problem, vector: np.ndarray) -> str:
     return tomli_w.dumps({"controller": table["controller"], "fields": values})
 
 
+FREQUENCIES = ("FLSS", "FLDS")
+
+
 def convergence_figure(history: "xr.Dataset") -> "Figure":
     """Draw the costs of all candidates and the lowest cost so far over the evaluations, from `stages.history`."""
     figure, found = picture(8.0, 4.6), []
@@ -179,13 +181,13 @@ def convergence_figure(history: "xr.Dataset") -> "Figure":
             axes.text(evaluation[0], 1.0, f" {stage}", va="top", fontsize=10)
             found.append(f"{part.best.values[0]:.2f} to {part.best.values[-1]:.2f} in the {stage}")
     cost = history.cost.attrs["long_name"]
-    label = f"{'FLSS' if cost == 'FLSS' else 'cost'} on the starts of the stage"
+    label = f"{cost if cost in FREQUENCIES else 'cost'} on the starts of the stage"
     axes.set(xlabel="evaluations of the cost function", ylabel=label, ylim=(-0.02, 1.02))
     head(
         figure,
         f"lowest {label.split()[0]} so far: {', '.join(found)}",
         in_figure(history.attrs["title"]),
-        "" if cost == "FLSS" else f"cost: {cost}",
+        "" if cost in FREQUENCIES else f"cost: {cost}",
     )
     tidy(axes)
     figure.legend(loc="outside lower center", ncols=2, **LEGEND)

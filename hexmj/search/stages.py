@@ -127,7 +127,7 @@ def search(
         InputError: a setting is invalid, or the best candidate cannot walk.
         SimulationError: the body does not settle at a start, or the simulation of the best candidate fails.
     """
-    effort = effort.completed(physical=problem.conditions is not None)
+    effort = effort.completed(physical=problem.physical)
     domain = problem.domain(effort.domain, effort.beginning)
     budgets = dict(zip(STAGES, (effort.budget, effort.refine_budget), strict=True))
     sizes = dict(zip(STAGES, (effort.starts or 0, effort.refine_starts or 0), strict=True))
@@ -143,7 +143,7 @@ def search(
         def costs(stage: str, candidates: np.ndarray) -> np.ndarray:
             nonlocal done
             result = np.empty(len(candidates))
-            size = 1 if problem.conditions else len(candidates)  # physical walks are slow: cache each cost at once
+            size = 1 if problem.physical else len(candidates)  # physical walks are slow: cache each cost at once
             for i in range(0, len(candidates), size):
                 known = cached[stage].known
                 result[i : i + size] = cached[stage](candidates[i : i + size])

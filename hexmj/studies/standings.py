@@ -79,8 +79,9 @@ def standings(
     planned, walked, gaits = (
         cells(f"{kind} {v}" for v in velocities.tolist()) for kind in ("kinematic", "physics", "gait")
     )
-    events = {"kinematic": planned.lost, "physical": walked.fell}
-    events |= {measure: happened(walked[f"{measure}_loss"]) for measure in ("grounded", "carried")}
+    events = {"kinematic": planned.lost}
+    events |= {measure: happened(walked[f"{measure}_loss"]) for measure in ("dynamic", "grounded", "carried")}
+    events["physical"] = walked.fell
     ideal = np.array([is_ideal(*entrant) for entrant in entrants.items()])
     random = [name for name, begins in zip(names, ideal, strict=True) if not begins]
     reference = REFERENCE if REFERENCE in random else next(iter(random), "")
@@ -154,6 +155,7 @@ times leg length: muscle forces above 50 body weights act at a tenth of the leg'
 
 MEASURES = {
     "kinematic": "Kinematic FLSS",
+    "dynamic": "FLDS",
     "grounded": "Grounded FLSS",
     "carried": "Carried FLSS",
     "physical": "Physical FLSS",

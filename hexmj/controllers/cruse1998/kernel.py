@@ -16,6 +16,8 @@ import numpy as np
 
 from hexmj.jitted import inlined, jitted, part
 from hexmj.legs import MIRROR, N2, N4
+from hexmj.stability import margin_of
+from hexmj.tipping import tip
 
 LANES = 64
 PRINTED, UNDELAYED, SEQUENTIAL = range(3)
@@ -34,15 +36,20 @@ L1, L2, L3, R1, R2, R3 = np.arange(6)
 X, S, S_OLD, AEP, PEP_SHIFT, AEP_SHIFT = np.arange(0, 36, 6)
 # One row per variable: V_r(t), final V_r, number of steps to search and of steps done, step of the first loss or 0.
 V, V_FINAL, STEPS, DONE, LOST = range(36, 41)
-ROWS = 41
+# The pendulum of `tipping`: excursion, its speed, the greatest excursion, step of the loss of dynamic stability or 0.
+EXCURSION, SPEED, MOST, TIPPED = range(41, 45)
+ROWS = 45
+
+SLACK = 1e-9
+"""Slope by which static stability is certain in spite of rounding errors, see `_stable`."""
 
 # Indices into the weights `p`: six weights of each kind, one per destination.  P^2 is multiplied by AEP_0 - PEP_min.
 _P1_REAR, _P1_CONTRA, _P2_REAR, _P4_FRONT = range(0, 24, 6)
 _P31_FRONT, _P32_FRONT, _P33_FRONT, _P34_FRONT = range(24, 48, 6)
 _P31_CONTRA, _P32_CONTRA, _P33_CONTRA, _P34_CONTRA = range(48, 72, 6)
 
-# Indices into the constants `k`: AEP_0, PEP_0, PEP_min, dt, V_r(0), a, six origins of axes, 1 / |y| of six lines.
-_AEP0, _PEP0, _PEP_MIN, _DT, _V_START, _RATE, _ORIGIN, _PER_Y = 0, 1, 2, 3, 4, 5, 6, 12
+# Indices into the constants `k`: AEP_0, PEP_0, PEP_min, dt, V_r(0), a, six origins of axes, 1 / |y| and y of six lines.
+_AEP0, _PEP0, _PEP_MIN, _DT, _V_START, _RATE, _ORIGIN, _PER_Y, _Y = 0, 1, 2, 3, 4, 5, 6, 12, 18
 
 # Indices into `rules`, the choices of `network.Order` and `network.ModelVariant`.  A choice is the length of a tuple,
 # and so part of its type: numba compiles each combination separately, without branches for the other choices.
@@ -143,13 +150,13 @@ def _moves_in_turn(x, s, s_old, aep, v, v_neutral, p, k, rules):
 
 
 @inlined
-def _stable(x, s, k):
-    """Return whether the centre of mass lies strictly inside the support polygon.
+def _stable(x, s, k, slack=0.0):
+    """Return whether the centre of mass lies strictly inside the support polygon, by more than `slack`.
 
     With u = x / |y| of the standing feet, it does if and only if feet stand on both sides, max u left + max u right
     > 0, and min u left + min u right < 0.
     """
-    o, w = k[_ORIGIN:_PER_Y], k[_PER_Y:]
+    o, w = k[_ORIGIN:_PER_Y], k[_PER_Y:_Y]
     u0, u1, u2 = (o[0] + x[0]) * w[0], (o[1] + x[1]) * w[1], (o[2] + x[2]) * w[2]
     u3, u4, u5 = (o[3] + x[3]) * w[3], (o[4] + x[4]) * w[4], (o[5] + x[5]) * w[5]
     none = np.inf
@@ -157,7 +164,7 @@ def _stable(x, s, k):
     front += max(u3 if s[3] == 1.0 else -none, u4 if s[4] == 1.0 else -none, u5 if s[5] == 1.0 else -none)
     rear = min(u0 if s[0] == 1.0 else none, u1 if s[1] == 1.0 else none, u2 if s[2] == 1.0 else none)
     rear += min(u3 if s[3] == 1.0 else none, u4 if s[4] == 1.0 else none, u5 if s[5] == 1.0 else none)
-    return (front > 0.0) & (rear < 0.0)
+    return (front > slack) & (rear < -slack)
 
 
 @inlined
@@ -252,6 +259,7 @@ def _begin(z, j, start, v, v_final, steps, k):
         z[(PEP_SHIFT + leg) * LANES + j] = z[(AEP_SHIFT + leg) * LANES + j] = 0.0
     z[V * LANES + j], z[V_FINAL * LANES + j] = v, v_final
     z[STEPS * LANES + j], z[DONE * LANES + j], z[LOST * LANES + j] = steps, 0.0, 0.0
+    z[EXCURSION * LANES + j] = z[SPEED * LANES + j] = z[MOST * LANES + j] = z[TIPPED * LANES + j] = 0.0
 
 
 @part
@@ -261,20 +269,47 @@ def _block():
     return z[(64 - z.ctypes.data % 64) % 64 // 8 :]
 
 
+@part
+def _tip_over(z, pendulum, feet, stands, k):
+    """Let the pendulums of a block follow a step; `feet`, (leg, 2), and `stands`, (leg,), are scratch arrays."""
+    gain, height = pendulum
+    for j in range(LANES):
+        if not (z[TIPPED * LANES + j] == 0.0 and z[DONE * LANES + j] <= z[STEPS * LANES + j]):
+            continue
+        x, s, excursion = _load(z, X, j), _load(z, S, j), z[EXCURSION * LANES + j]
+        if excursion == 0.0 and _stable(x, s, k, SLACK):
+            continue
+        for leg in range(6):
+            feet[leg, 0], feet[leg, 1] = z[(X + leg) * LANES + j] + k[_ORIGIN + leg], k[_Y + leg]
+            stands[leg] = z[(S + leg) * LANES + j] == 1.0
+        excursion, speed = tip(margin_of(feet, stands), excursion, z[SPEED * LANES + j], gain)
+        z[EXCURSION * LANES + j], z[SPEED * LANES + j] = excursion, speed
+        z[MOST * LANES + j] = max(z[MOST * LANES + j], excursion)
+        z[TIPPED * LANES + j] = z[DONE * LANES + j] if excursion > height else 0.0
+
+
 @jitted
-def first_losses(starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, rules: Any, lost: Any) -> None:
-    """Write each start's step of the first loss of static stability to `lost`, (start,); 0 if its `steps` have none.
+def first_losses(
+    starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, rules: Any, pendulum: Any, tips: Any
+) -> None:
+    """Write what each start loses within its `steps` to `tips`, the arrays of a `tipping.Tips`.
 
     `starts` is (start, leg), `v`, `v_final` and `steps` are (start,); `p`, `k` and `rules` are the parts of
-    `network.Constants`: weights, constants and choices.
+    `network.Constants`: weights, constants and choices. Walks end at the loss of dynamic stability, or, if the gain of
+    the pendulum is 0, at the first loss of static stability.
     """
     z, start_in = _block(), np.full(LANES, -1)  # index of the start in each lane; -1 if the lane is empty
+    feet, stands = np.empty((6, 2)), np.empty(6, np.bool_)
+    lost, tipped, most = tips
+    end = TIPPED if pendulum[0] > 0.0 else LOST
     following = undecided = 0
     while True:
         if undecided == 0 or (undecided < LANES and following < len(starts)):
             for j in range(LANES):
-                if not _undecided(z, j) and start_in[j] >= 0:
-                    lost[start_in[j]] = z[LOST * LANES + j]
+                if not _undecided(z, j, end) and start_in[j] >= 0:
+                    i = start_in[j]
+                    lost[i], tipped[i] = z[LOST * LANES + j], z[TIPPED * LANES + j]
+                    most[i] = z[MOST * LANES + j]
                     start_in[j] = -1
                 if start_in[j] < 0 and following < len(starts):
                     _begin(z, j, starts[following], v[following], v_final[following], steps[following], k)
@@ -283,14 +318,16 @@ def first_losses(starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, 
         if start_in.max() < 0:
             return
         _step(z, rules[_ORDER], p, k, rules)
+        if end == TIPPED:
+            _tip_over(z, pendulum, feet, stands, k)
         undecided = 0
         for j in range(LANES):
-            undecided += _undecided(z, j)
+            undecided += _undecided(z, j, end)
 
 
 @inlined
-def _undecided(z, j):
-    return (z[LOST * LANES + j] == 0.0) & (z[DONE * LANES + j] < z[STEPS * LANES + j])
+def _undecided(z, j, end):
+    return (z[end * LANES + j] == 0.0) & (z[DONE * LANES + j] < z[STEPS * LANES + j])
 
 
 @jitted

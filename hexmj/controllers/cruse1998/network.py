@@ -13,12 +13,13 @@ import numpy as np
 
 import hexmj.controllers.cruse1998.kernel as kernel
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS, PLACES, AnyWeights, Symmetric, Weights, general
-from hexmj.controllers.planning import planned_losses
+from hexmj.controllers.planning import planned_losses, planned_tips
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import run_blocks, thread_count
 from hexmj.timing import Acceleration, Stride
+from hexmj.tipping import Pendulum, Tips
 from hexmj.validate import choice, short, whole
 from hexmj.walks import PlannedWalk
 
@@ -153,7 +154,7 @@ class Cruse1998:
         table += [(p, source) for source in (kernel.FRONT, kernel.CONTRA) for p in (w.p31, w.p32, w.p33, w.p34)]
         p = np.concatenate([matrix[d, source] for matrix, source in table])
         eq11 = (acceleration.start, acceleration.rate) if acceleration else (0.0, 0.0)
-        k = np.array([stride.aep0, stride.pep0, stride.pep_min, stride.dt, *eq11, *g.origin, *(1 / np.abs(g.y))])
+        k = np.array([stride.aep0, stride.pep0, stride.pep_min, stride.dt, *eq11, *g.origin, *(1 / np.abs(g.y)), *g.y])
         chosen: list[tuple[Any, str]] = [(Order, self.order)]
         chosen += [(hint, getattr(self.model_variant, name)) for name, hint in get_type_hints(ModelVariant).items()]
         rules = tuple((0,) * get_args(names).index(value) for names, value in chosen)
@@ -210,17 +211,26 @@ class NetworkPlan:
         """See `protocol.Plan`; the call keeps only the present state of each walk in memory."""
         if "_blocks" in vars(self):
             return planned_losses(self, steps, self.threads)
-        lost, size = np.empty(len(steps), dtype=int), len(steps)
+        return self._tips(steps, Pendulum(0.0, 0.0)).lost
+
+    def first_tips(self, steps: np.ndarray, pendulum: Pendulum) -> Tips:
+        """See `protocol.Plan`."""
+        if "_blocks" in vars(self):
+            return planned_tips(self, steps, pendulum, self.threads)
+        return self._tips(steps, pendulum)
+
+    def _tips(self, steps: np.ndarray, pendulum: Pendulum) -> Tips:
+        tips, size = Tips.none(len(steps)), len(steps)
         block = max(8 * kernel.LANES, -(-size // (4 * thread_count(self.threads))))
         block = max(kernel.LANES, min(block, AT_ONCE // int(max(1, steps.max(initial=0)))))
 
         def work(begin: int, end: int) -> None:
             part = slice(begin, end)
             walks = self.starts[part], self.first[part], self.final[part], steps[part]
-            kernel.first_losses(*walks, *self.constants, lost[part])
+            kernel.first_losses(*walks, *self.constants, tuple(pendulum), tuple(column[part] for column in tips))
 
         run_blocks(work, size, block, self.threads)
-        return lost
+        return tips
 
     def first_losses_after(self, unseen: int, seen: int) -> np.ndarray:
         """Advance by `unseen` steps, then by `seen` steps, and find the first loss within the `seen` steps.
