@@ -290,7 +290,7 @@ def examples() -> Any:
 WALK = "walk --velocity 0.5 --observation-time 16"
 AHEAD = "walk --velocity 0.7 --observation-time 60 --vp 200 --dt 0.5 --physical --ground-at 45"
 FLSS = "flss --starts 100 --observation-time start --velocity"
-FALLS = "flss --physical --velocity 0.8 --starts 6 --observation-time 40"
+FALLS = "flss --measure physical --velocity 0.8 --starts 6 --observation-time 40"
 SEARCH = "search --observation-time start --starts 20 --budget 20 --refine-budget 0 --verdict-starts 30 --form"
 FILM = "--width 160 --height 120 --fps 10"
 LEAGUE = "league --quick --starts 10 --physical-starts 2 --trial-starts 1 --velocity 0.5 --trial-velocity 0.8"
@@ -366,7 +366,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "search range": f"{SEARCH} mirrored --velocity 0.3 0.6 --begin hws --ties later",
     "search over variants": f"{SEARCH} hws --velocity 0.5 --over mean",
     "search fields": f"{SEARCH} tripod.py:Tripod --velocity 0.5",
-    "search physical": f"{SEARCH.replace('20', '10')} hws --velocity 0.7 --physical --vp 200 --dt 0.5",
+    "search physical": f"{SEARCH.replace('20', '10')} hws --velocity 0.7 --measure physical --vp 200 --dt 0.5",
     "doctor": lambda: {check["name"]: True for check in json.loads(run_command("doctor --json")[1])["checks"]},
     "errors": lambda: [text("flss --velocity 1.5"), text("walk --controller nothing")],
     "process": lambda: [process("--help"), process("--version"), process(f"{FLSS} 0.5 --json")],

@@ -126,8 +126,8 @@ def searched(seed: int) -> Arrays:
     out: dict[str, Any] = {}
     ways: Any = (("evolution", "hws", None), ("cmaes", "mirrored", None), ("cmaes", "ldvs", "body"))
     for algorithm, form, body in ways:
-        conditions = hexmj.Conditions() if body else None
-        problem = hexmj.Problem(NetworkForm(form), 0.4, 0.5, observation_time=30.0, conditions=conditions)
+        measure: Any = "physical" if body else "kinematic"
+        problem = hexmj.Problem(NetworkForm(form), 0.4, 0.5, observation_time=30.0, measure=measure)
         few = 4 if body else 60
         effort = hexmj.Effort(
             algorithm=algorithm, population=4, starts=few, budget=12, refine_starts=few, refine_budget=6,

@@ -129,9 +129,9 @@ BAD = [
     "flss --controller nowhere.py:Tripod",
     "flss --friction 0.5",
     "flss --feedback",
-    "flss --physical --load -1",
-    "flss --physical --range-of 10",
-    "flss --physical --ground gap --ground-height 5",
+    "flss --measure physical --load -1",
+    "flss --measure physical --range-of 10",
+    "flss --measure physical --ground gap --ground-height 5",
     "flss --threads 0",
     "flss --processes 0",
     "flss --out taken",
@@ -248,7 +248,9 @@ def test_compare_writes_the_same_bits_on_one_thread_and_two_and_a_video(run, tmp
 
 
 def test_physical_flss_counts_falls(run):
-    code, text, _ = run("flss", "--physical", "--velocity", 0.8, "--starts", 4, "--observation-time", 20, "--json")
+    code, text, _ = run(
+        "flss", "--measure", "physical", "--velocity", 0.8, "--starts", 4, "--observation-time", 20, "--json"
+    )
     assert code == 0
     table = hexmj.physical_flss(hexmj.LDVS, [0.8], n_starts=4, observation_time=20.0)
     assert json.loads(text)["flss"] == table.flss.values.tolist()

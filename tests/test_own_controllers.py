@@ -211,5 +211,5 @@ class Far:
 def test_a_walk_whose_tips_no_leg_reaches_is_no_outcome():
     with pytest.raises(hexmj.InputError, match="reach"):
         hexmj.physical_flss(Far(), [0.5], n_starts=2, observation_time=5.0)
-    problem = hexmj.Problem(hexmj.FieldsForm(Far()), 0.5, 0.5, observation_time=5.0, conditions=hexmj.Conditions())
+    problem = hexmj.Problem(hexmj.FieldsForm(Far()), 0.5, 0.5, observation_time=5.0, measure="physical")
     assert Sample(problem, 2, 0).costs(np.array([[1e6], [5.0]])).tolist() == [1.0, 0.0]

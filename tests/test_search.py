@@ -141,7 +141,7 @@ def test_the_command_reports_a_finished_search_again(run: Any, tmp_path: Path):
 @pytest.mark.slow
 def test_a_physical_search_counts_falls(tmp_path: Path):
     conditions = hexmj.Conditions(vp=200.0)
-    problem = Problem(NetworkForm("mirrored"), 0.9, 0.9, 5.0, conditions=conditions, feedback=True)
+    problem = Problem(NetworkForm("mirrored"), 0.9, 0.9, 5.0, measure="physical", conditions=conditions, feedback=True)
     effort = Effort(begin="ldvs", population=2, budget=2, starts=2, refine_budget=0, verdict_starts=4)
     answer = run_search(problem, effort, tmp_path).summary()
     found = hexmj.SensoryFeedback(hexmj.load_controller(str(tmp_path / "found.toml")))

@@ -48,7 +48,9 @@ def test_costs_do_not_depend_on_threads_or_on_the_other_candidates():
 @pytest.mark.parametrize("feedback", [False, True])
 def test_the_physical_cost_is_the_physical_flss(feedback):
     conditions = hexmj.Conditions(vp=200.0)
-    sample = Sample(Problem(LDVS, 0.6, 0.6, "start", conditions=conditions, feedback=feedback), 12, 0)
+    sample = Sample(
+        Problem(LDVS, 0.6, 0.6, "start", measure="physical", conditions=conditions, feedback=feedback), 12, 0
+    )
     walked = hexmj.SensoryFeedback(hexmj.LDVS) if feedback else hexmj.LDVS
     how: Any = {"n_starts": 12, "conditions": conditions}
     expected = hexmj.physical_flss(walked, [0.6], observation_time="start", **how).flss.item()

@@ -107,7 +107,7 @@ def test_a_candidate_whose_simulation_fails_costs_as_one_that_loses_all_and_is_n
         return SimpleNamespace(fall=np.full(len(settled.starts), np.inf))
 
     monkeypatch.setattr("hexmj.measures.physical.physical_outcomes", outcomes)
-    problem = Problem(FieldsForm(Pace()), 0.3, 0.3, observation_time=5.0, conditions=hexmj.Conditions())
+    problem = Problem(FieldsForm(Pace()), 0.3, 0.3, observation_time=5.0, measure="physical")
     assert Sample(problem, 2, 0).costs(np.array([[1.5, -0.5], [2.5, -0.5]])).tolist() == [1.0, 0.0]
     found = search(problem, Effort(starts=2, budget=10, refine_budget=0))
     assert found.vector[0] >= 2 and found.cost == 0 and (found.history.cost == 1).any()
@@ -128,7 +128,7 @@ class Far(Pace):
 
 
 def test_what_no_leg_reaches_is_never_found():
-    problem = Problem(FieldsForm(Far()), 0.3, 0.3, observation_time=5.0, conditions=hexmj.Conditions())
+    problem = Problem(FieldsForm(Far()), 0.3, 0.3, observation_time=5.0, measure="physical")
     with pytest.raises(InputError, match="out of reach"):
         search(problem, Effort(starts=2, budget=10, refine_budget=0, domain=2.0))
 

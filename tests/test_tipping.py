@@ -1,4 +1,4 @@
-"""Laws of dynamic stability: the pendulum of `hexmj.tipping`, in compiled plans, in other plans and in readable form."""
+"""Laws of dynamic stability: the pendulum of `hexmj.tipping`, compiled, in other plans and in readable form."""
 
 from dataclasses import replace
 

@@ -188,7 +188,7 @@ class Search(Command):
         lines = [
             title(problem, effort),
             table(("parameter", *result.vectors), numbers),
-            f"{result.problem.frequency} on {effort.verdict_starts} fresh starts (seed {effort.verdict_seed}), with 95 % intervals",
+            f"{problem.frequency} on {effort.verdict_starts} fresh starts (seed {effort.verdict_seed}), 95 % intervals",
             table(("controller", *(f"observation time {time.removesuffix('.0')}" for time in times)), judged),
             *result.found.report(problem),
         ]

@@ -111,7 +111,7 @@ class Flss(StudyCommand):
     defaults = {"out": None}  # noqa: RUF012
     data = "flss.nc"
     figures = {"flss": "flss"}  # noqa: RUF012
-    examples = ("--velocity 0.5", "--measure dynamic --vp 80", "--measure physical --starts 50 --out results/flss")
+    examples = ("--velocity 0.5", "--measure physical --starts 50 --out results/flss")
 
     def build(self, given: SimpleNamespace) -> Any:
         check_measure(given)
