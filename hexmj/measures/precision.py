@@ -6,7 +6,6 @@ actual one, see `tipping`.  A plan that tips even at a much higher V_p nearly al
 static stability nearly never, so that walks are needed mainly in between (Neyman 1934, J. R. Stat. Soc. 97).
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
