@@ -1,6 +1,7 @@
 """Laws that the physics must keep: units, mirror, time step, momentum, penetration and energy."""
 
 import copy
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -19,7 +20,7 @@ from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk, physical_walk_of_plan
 from hexmj.physics.engine import STATE
 from hexmj.physics.foot_path import OrdersFromPlan
-from hexmj.physics.outcomes import TOPPLED
+from hexmj.physics.outcomes import TOPPLED, OutcomesSoFar
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, settle
 from hexmj.rotations import heading, rotated, turned
@@ -208,6 +209,38 @@ def test_tracking_is_a_percentile_and_depth_the_most_of_all_feet():
     assert (shown <= deepest).all()
 
 
+def lowest_points_slide(compiled, qpos):
+    """Return how far the points of the feet that are lowest in each posture, (time, position), move until the next,
+    (time - 1, leg, 2) [mm]: points of MuJoCo's bodies, halfway between the lowest before and after."""
+    model, data, feet = compiled.model, mujoco.MjData(compiled.model), list(compiled.body.feet)
+    tibia = model.site_bodyid[[model.site(foot).id for foot in feet]]
+    down = np.array([0.0, 0.0, -compiled.foot_radius])
+    seen = []
+    for data.qpos[:] in qpos:
+        mujoco.mj_kinematics(model, data)
+        seen.append((data.site_xpos[[model.site(foot).id for foot in feet]], data.xmat[tibia].reshape(6, 3, 3)))
+    centre, turn = (np.array(each) for each in zip(*seen, strict=True))
+    material = (down @ turn[:-1] + down @ turn[1:])[..., None] / 2  # in the frame of the tibia
+    return (np.diff(centre, axis=0) + (np.diff(turn, axis=0) @ material)[..., 0])[..., :2]
+
+
+def test_a_foot_that_rolls_does_not_slip():
+    """The body turns about a lateral axis while one foot alone carries it and rolls ahead."""
+    settled = settle(draw_starts(1, 0))
+    compiled, qpos = settled.compiled, settled.qpos[0]
+    chunk = next(iter(drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 1.0)))
+    angle = 0.001 * np.arange(chunk.qpos.shape[1])
+    ahead = np.outer(angle, [compiled.foot_radius, 0.0, 0.0])
+    turning = np.stack([np.cos(angle / 2), 0 * angle, np.sin(angle / 2), 0 * angle], axis=-1)
+    tip = compiled.forward(qpos[compiled.columns.qpos].reshape(6, -1))[0]
+    rolling = np.column_stack([ahead - rotated(turning, tip), turning, np.tile(qpos[7:], (len(angle), 1))])
+    sensors = np.zeros(chunk.sensors.shape)
+    sensors[0, :, compiled.columns.foot][:, :3], sensors[0, :, compiled.columns.touch.start] = ahead, 1.0
+    so_far = OutcomesSoFar(settled, np.full(1, np.inf))
+    so_far.add(replace(chunk, qpos=rolling[None], sensors=sensors))
+    assert so_far.outcomes().slip == pytest.approx(0.0, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("controller", "velocity", "vp", "strength"),
     [(LDVS, 0.5, 400.0, 0.1), (UNCOORDINATED, 0.7, 80.0, 1.0), (LDVS, 0.01, 80.0, 1.0)],
@@ -232,10 +265,10 @@ def test_outcomes_are_what_the_chunks_show(controller, velocity, vp, strength):
             for name in ("qpos", "sensors", "force", "depth")
         )
         slid, contacts = 0.0, 0
-        for one in sensors:  # from substep to substep of a chunk
-            feet, touch = one[:, columns.foot].reshape(-1, 6, 3), one[:, columns.touch] > 0
+        for one, places in zip(sensors, qpos, strict=True):  # from substep to substep of a chunk
+            touch = one[:, columns.touch] > 0
             both = touch[1:] & touch[:-1]
-            slid += np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1)[both].sum()
+            slid += np.linalg.norm(lowest_points_slide(compiled, places), axis=-1)[both].sum()
             contacts += both.sum()
         q, shown, torques = np.concatenate(qpos), np.concatenate(sensors), np.abs(np.concatenate(force))
         lowest = q[:, None, 2] + rotated(q[:, None, 3:7], corners)[..., 2] - radii

@@ -5,10 +5,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hexmj.bodies.kinematics import hinge_chains
 from hexmj.conditions import Conditions
 from hexmj.errors import OutOfReach, SimulationError
 from hexmj.jitted import jitted
 from hexmj.physics.foot_path import steps_in_chunk
+from hexmj.physics.rolling import rolled
 from hexmj.physics.rollout import Chunk
 from hexmj.physics.settle import Settled
 from hexmj.rotations import lowest, matrix
@@ -54,7 +56,7 @@ class Outcomes:
     speed: np.ndarray
     """(start,) distance walked in the initial heading, divided by the commanded distance; NaN at V = 0."""
     slip: np.ndarray
-    """(start,) mean sliding speed of a foot in contact [mm/s]."""
+    """(start,) mean sliding speed of a foot's lowest point in contact, without the foot's rolling [mm/s]."""
     tracking: np.ndarray
     """(start,) 95th percentile of the distance between a foot and its target, for targets on the ground [mm]. It is a
     multiple of `Lengths.tracking_bin`; for the stick insect of 0.01 mm, with inf for more than 20 mm."""
@@ -83,7 +85,7 @@ class _Sums(NamedTuple):
     toppled: np.ndarray
     """(start,) number of substeps until the trunk topples; inf if it does not."""
     slid: np.ndarray
-    """(start,) distance that all feet slid in contact [mm]."""
+    """(start,) distance that the lowest points of all feet slid in contact [mm]."""
     contacts: np.ndarray
     """(start,) number of substeps in contact, summed over the feet."""
     saturated: np.ndarray
@@ -109,19 +111,21 @@ class OutcomesSoFar:
         misses = np.zeros((size, lengths.tracking_bins + 1), dtype=np.uint32)
         clearance, toppled = np.full((2, size), np.inf)
         self._sums = _Sums(clearance, upright, toppled, slid, contacts, saturated, shown, misses)
-        self._before = np.zeros((size, compiled.model.nsensordata))
+        self._before = np.zeros((size, compiled.model.nq)), np.zeros((size, compiled.model.nsensordata))
         columns, ground = compiled.columns, -settled.conditions.standing_height
         self._body = columns.foot.start, columns.touch.start, *compiled.trunk_corners, 0.999 * compiled.torque_limits
-        self._scale = ground, lengths.tracking_bin
+        self._scale, chains = (ground, lengths.tracking_bin), hinge_chains(compiled.model, compiled.body)
+        self._rolling = chains.axis, chains.zero, compiled.foot_radius
 
     def add(self, chunk: Chunk) -> None:
         """Add one chunk of `rollout.drive`."""
         settled, ids, dt, m = self._settled, chunk.ids, self._settled.stride.dt, self._settled.substeps
         seen = chunk.qpos, chunk.sensors, np.ascontiguousarray(chunk.targets), chunk.force, chunk.valid
         since = self._before, chunk.first, len(chunk.plan.time) * m, steps_in_chunk(m) * m
-        _scan(seen, since, ids, self._body, self._scale, self._sums)
+        _scan(seen, since, ids, self._body, self._rolling, self._scale, self._sums)
         n, last = np.arange(len(ids)), chunk.valid - 1
-        self._before[ids] = chunk.sensors[n, last]
+        for before, now in zip(self._before, (chunk.qpos, chunk.sensors), strict=True):
+            before[ids] = now[n, last]
         trunk = chunk.sensors[n, last, settled.compiled.columns.trunk] > 0
         fell, until = chunk.fell, np.where(chunk.fell, last, chunk.valid)
         self._fall[ids[fell]] = ((chunk.first + last) / m * dt)[fell]
@@ -304,18 +308,19 @@ class EffortSoFar:
 
 
 @jitted
-def _scan(chunk: Any, since: Any, ids: Any, body: Any, scale: Any, sums: Any) -> None:
+def _scan(chunk: Any, since: Any, ids: Any, body: Any, rolling: Any, scale: Any, sums: Any) -> None:
     """Add a chunk's substeps to the sums of its starts.
 
     Sliding to a substep at which a chunk of default length would begin does not count, even if pushes shorten chunks.
     """
     qpos, sensors, targets, force, valid = chunk
-    last, first, end, default_length = since
+    (last_qpos, last_sensors), first, end, default_length = since
     feet, touch, corner, radius, limit = body
     for i, start in enumerate(ids):
         for t in range(valid[i]):
             slides = t == end or (first + t) % default_length != 0
-            q, sensed, before = qpos[i, t], sensors[i, t], sensors[i, t - 1] if t > 0 else last[start]
+            q, sensed = qpos[i, t], sensors[i, t]
+            q_before, before = (qpos[i, t - 1], sensors[i, t - 1]) if t > 0 else (last_qpos[start], last_sensors[start])
             _count_misses(q, sensed[feet : feet + 18], targets[i, t], scale, sums.misses[start])
             _, _, _, _, _, _, _, _, up_z = matrix(q[3], q[4], q[5], q[6])
             sums.clearance[start] = min(sums.clearance[start], lowest(q, corner, radius))
@@ -325,7 +330,8 @@ def _scan(chunk: Any, since: Any, ids: Any, body: Any, scale: Any, sums: Any) ->
             for leg in range(6):
                 if slides and sensed[touch + leg] > 0 and before[touch + leg] > 0:
                     f = feet + 3 * leg
-                    sums.slid[start] += np.hypot(sensed[f] - before[f], sensed[f + 1] - before[f + 1])
+                    ahead, left = rolled(q_before, q, leg, rolling)
+                    sums.slid[start] += np.hypot(sensed[f] - before[f] - ahead, sensed[f + 1] - before[f + 1] - left)
                     sums.contacts[start] += 1.0
             for joint in range(len(limit)):
                 sums.saturated[start] += abs(force[i, t, joint]) >= limit[joint]
