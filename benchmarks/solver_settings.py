@@ -1,154 +1,156 @@
-"""Physical FLSS and steps per second for other solver settings, by which the insect's settings were chosen.
+"""Falls and slip for other physics steps, integrators and models of friction, and the parts of the slip.
 
-    python -m benchmarks.solver_settings [FOLDER] [STARTS]
+    python -m benchmarks.solver_settings [STARTS] [PAGE]
 
-Each row changes one setting, and LDVS walks the same starts from rest at V = 0.5. The last column says whether the FLSS
-lies within the 95 % interval of the finest physics, a quarter of the shipped time step. Among those, we chose by slip
-and speed. Rows are timed in turn, three times, and the median counts. The result is FOLDER/solver_settings.json.
+LDVS walks the same starts from rest with each setting. The difference of the falls from the shipped setting has its
+95 % interval over paired starts. PAGE, by default docs/concepts/physics.md, gets the table between its comments. The
+parts of the displacement of standing feet are printed: `Parts` defines them.
 """
 
+import copy
 import sys
-from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import chdir
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from benchmarks.table import print_table
-from hexmj import LDVS, Conditions, SimulationError, Stride, draw_starts
-from hexmj.bodies.mjcf import compile_body
+from docs.results import END, table
+from hexmj import LDVS, Conditions, draw_starts
+from hexmj.bodies.kinematics import hinge_chains
 from hexmj.files import write_text
-from hexmj.io import json_text
+from hexmj.jitted import jitted
 from hexmj.measures.physical import physical_outcomes
+from hexmj.physics.outcomes import EffortSoFar
+from hexmj.physics.rolling import rolled
+from hexmj.physics.rollout import Chunk
 from hexmj.physics.settle import Settled, settle
-from hexmj.stats import wilson_interval
+from hexmj.stats import paired_difference
+from hexmj.timing import observation_duration
 
-VELOCITY, DURATION = 0.5, 40.0
-FINEST = "time step / 4"
-ROUNDS = 3
+VELOCITIES, SEED = (0.5, 0.7), 0
+STEPS = {1: "0.625 ms", 2: "0.313 ms", 4: "0.156 ms"}
+SHIPPED = f"implicitfast, {STEPS[1]} (shipped)"
+BEGIN = "<!-- table: numerics -->\n"
+PARTS = ("displacement", "landing", "rolling", "creep")
 
-OPTIONS: dict[str, dict[str, Any]] = {
-    "as shipped": {},
-    "dense Jacobian": {"jacobian": mujoco.mjtJacobian.mjJAC_DENSE},
-    "islands": {"disableflags": 0},
+DISCRETE = {"integrator": mujoco.mjtIntegrator.mjINT_DISCRETE}
+FRICTION: dict[str, dict[str, Any]] = {
+    **{f"impratio {ratio} (shipped: 3)": {"impratio": ratio} for ratio in (1, 10, 100)},
     "pyramidal cone": {"cone": mujoco.mjtCone.mjCONE_PYRAMIDAL},
-    **{f"impratio {ratio}": {"impratio": ratio} for ratio in (1, 2, 5, 10, 30, 100)},
-    **{f"at most {n} iterations": {"iterations": n} for n in (3, 5, 8)},
-    "tolerance 1": {"tolerance": 1.0},
-    "solver CG": {"solver": mujoco.mjtSolver.mjSOL_CG},
-    "Euler": {"integrator": mujoco.mjtIntegrator.mjINT_EULER},
+    "3 noslip iterations": {"noslip_iterations": 3},
 }
-"""Setting -> values of `mjOption` that differ from the shipped ones."""
+"""Model of friction -> values of `mjOption` that differ from the shipped ones."""
 
 
 def variants(starts: np.ndarray) -> Iterator[tuple[str, Settled]]:
-    """Yield the name of a setting and the starts at rest."""
-    settled = settle(starts)
-    for name, options in OPTIONS.items():
-        yield name, with_model(settled, **options)
-    yield "pairs searched for", with_model(settled, searched=True)
-    coarse = with_model(settled, timestep=settled.conditions.seconds(settled.stride))
-    yield "time step x 2", replace(coarse, conditions=_Coarse())
-    yield "time step / 2", settle(starts, Conditions(longest_substep=0.3125))
-    yield FINEST, settle(starts, Conditions(longest_substep=0.15625))
+    """Yield the name of a setting and the starts at rest, which settle with the shipped integrator and friction."""
+    for parts, name in STEPS.items():
+        settled = settle(starts, Conditions(longest_substep=0.625 / parts))
+        yield SHIPPED if parts == 1 else f"implicitfast, {name}", settled
+        yield f"discrete, {name}", with_options(settled, DISCRETE)
+    for name, options in FRICTION.items():
+        yield name, with_options(settle(starts), options)
 
 
-@dataclass(frozen=True)
-class _Coarse(Conditions):
-    """One physics step for each step of the plan, 1.25 ms, longer than `Conditions` allows."""
-
-    def substeps(self, stride: Stride) -> int:
-        return 1
-
-
-def with_model(settled: Settled, searched: bool = False, **options: Any) -> Settled:
-    """Return the same starts with other values in `mjOption`, or with contact pairs that MuJoCo searches for."""
-    conditions = settled.conditions
-    body, model = conditions.body, compile_body(conditions, settled.compiled.model.opt.timestep, looks=False).model
-    if searched:
-        spec = mujoco.MjSpec.from_file(str(body.mjcf))
-        spec.compiler.discardvisual = True
-        for pair in list(spec.pairs):
-            geom = spec.geom(pair.geomname2)
-            geom.conaffinity, geom.condim, geom.friction = 1, pair.condim, pair.friction[[0, 2, 3]]
-            geom.solref, geom.solimp = pair.solref, pair.solimp
-            spec.delete(pair)
-        ground, like = spec.geom(body.ground), spec.geom(body.trunk[0])
-        ground.contype, ground.solref, ground.solimp, ground.friction = 1, like.solref, like.solimp, like.friction
-        spec.option.timestep = model.opt.timestep
-        model = spec.compile()
+def with_options(settled: Settled, options: dict[str, Any]) -> Settled:
+    """Return the same starts with other values in `mjOption`."""
+    model = copy.copy(settled.compiled.model)
     for name, value in options.items():
         setattr(model.opt, name, value)
     return replace(settled, compiled=replace(settled.compiled, model=model))
 
 
-def measure(settled: Settled) -> dict[str, float]:
-    """Return FLSS with its interval, thousand physics steps/s, mean slip [mm/s] and mean relative speed."""
-    begin = perf_counter()
-    outcomes = physical_outcomes(settled, LDVS, VELOCITY, DURATION)
-    seconds = perf_counter() - begin
-    fell = np.isfinite(outcomes.fall)
-    low, high = wilson_interval(int(fell.sum()), len(fell))
-    walked = np.minimum(outcomes.fall, DURATION) / settled.stride.dt * settled.conditions.substeps(settled.stride)
-    return {
-        "flss": float(fell.mean()),
-        "low": low,
-        "high": high,
-        "steps_per_s": float(walked.sum() / seconds / 1e3),
-        "walks_per_s": len(fell) / seconds,
-        "slip": float(outcomes.slip.mean()),
-        "speed": float(np.nanmean(outcomes.speed)),
-    }
+class Parts(EffortSoFar):
+    """Divides the horizontal displacement of the centres of standing feet; the lengths of all steps are added up.
+
+    - rolling: displacement of a foot that rolls without sliding;
+    - landing: the rest, which is the sliding of the lowest point, from touchdown until its speed first stops to fall;
+    - creep: sliding after landing.
+    """
+
+    def __init__(self, settled: Settled) -> None:
+        """Begin with zero lengths."""
+        compiled = settled.compiled
+        chains, size = hinge_chains(compiled.model, compiled.body), len(settled.starts)
+        self._columns, self._timestep = compiled.columns, compiled.model.opt.timestep
+        self._rolling = chains.axis, chains.zero, compiled.foot_radius
+        self._lengths, self._along = np.zeros((2, size, len(PARTS)))
+        self._contacts, self._brakes = np.zeros(size), np.full((size, 6), -1.0)
+
+    def add(self, chunk: Chunk) -> None:
+        """Add one chunk."""
+        places = self._columns.foot.start, self._columns.touch.start
+        seen, sums = (chunk.qpos, chunk.sensors, chunk.valid), (self._lengths, self._along, self._contacts)
+        _divide(seen, chunk.ids, places, self._rolling, self._brakes, sums)
+
+    def speeds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the mean speeds of `PARTS`, and of their components along the displacement, (part,) [mm/s]."""
+        time = self._contacts[:, None] * self._timestep
+        return (self._lengths / time).mean(axis=0), (self._along / time).mean(axis=0)
 
 
-def table(starts: np.ndarray) -> dict[str, dict[str, float] | None]:
-    """Measure each setting; None where the simulation diverges."""
-    results: dict[str, dict[str, float] | None] = {}
-    settings, rates = dict(variants(starts)), defaultdict(list)
-    physical_outcomes(settings["as shipped"], LDVS, VELOCITY, 2.0)
-    for _ in range(ROUNDS):
-        for name, settled in settings.items():
-            try:
-                results[name] = row = measure(settled)
-                rates[name].append((row["steps_per_s"], row["walks_per_s"]))
-            except SimulationError:
-                results[name] = None
-    for name, row in results.items():
-        if row:
-            row["steps_per_s"], row["walks_per_s"] = np.median(rates[name], axis=0).tolist()
-    return results
+@jitted
+def _divide(seen: Any, ids: Any, places: Any, rolling: Any, brakes: Any, sums: Any) -> None:
+    """Add the parts of a chunk; `brakes` is the last sliding distance of a landing foot, -1 after its landing."""
+    qpos, sensors, valid = seen
+    lengths, along, contacts = sums
+    foot, touch = places
+    for i, start in enumerate(ids):
+        for t in range(1, valid[i]):
+            now, before = sensors[i, t], sensors[i, t - 1]
+            for leg in range(6):
+                if before[touch + leg] <= 0:
+                    brakes[start, leg] = np.inf
+                if before[touch + leg] <= 0 or now[touch + leg] <= 0:
+                    continue
+                f = foot + 3 * leg
+                moved_x, moved_y = now[f] - before[f], now[f + 1] - before[f + 1]
+                moved = np.hypot(moved_x, moved_y)
+                rolled_x, rolled_y = rolled(qpos[i, t - 1], qpos[i, t], leg, rolling)
+                slid_x, slid_y = moved_x - rolled_x, moved_y - rolled_y
+                slid = np.hypot(slid_x, slid_y)
+                brakes[start, leg] = slid if slid < brakes[start, leg] else -1.0
+                part = 1 if brakes[start, leg] >= 0 else 3
+                lengths[start, 0] += moved
+                lengths[start, 2] += np.hypot(rolled_x, rolled_y)
+                lengths[start, part] += slid
+                if moved > 0:
+                    along[start, 0] += moved
+                    along[start, 2] += (rolled_x * moved_x + rolled_y * moved_y) / moved
+                    along[start, part] += (slid_x * moved_x + slid_y * moved_y) / moved
+                contacts[start] += 1.0
 
 
-def rows(results: dict[str, dict[str, float] | None]) -> list[list[str]]:
-    """Return the rows of the table as texts."""
-    finest = results[FINEST]
-    assert finest
-    lines = []
-    for name, row in results.items():
-        if row is None:
-            lines.append([name, "diverges", "", "", "", "", "no"])
-            continue
-        qualifies = finest["low"] <= row["flss"] <= finest["high"]
-        flss = f"{row['flss']:.3f} ({row['low']:.2f}-{row['high']:.2f})"
-        figures = [f"{row[key]:.{digits}f}" for key, digits in (("slip", 1), ("speed", 3), ("steps_per_s", 0))]
-        lines.append([name, flss, *figures, f"{row['walks_per_s']:.0f}", "yes" if qualifies else "no"])
-    return lines
-
-
-def main(folder: str = "results/bench", starts: str = "400") -> None:
-    """Measure, print and write the table."""
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    with chdir(folder):  # MuJoCo writes its log there
-        results = table(draw_starts(int(starts), 0))
-    columns = ["setting", "physical FLSS", "slip [mm/s]", "speed", "1000 steps/s", "walks/s", "FLSS within"]
-    print_table(columns, rows(results))
-    text = json_text(results)
-    write_text(Path(folder) / "solver_settings.json", text)
+def main(starts: str = "400", page: str = "docs/concepts/physics.md") -> None:
+    """Measure all settings, print the parts of the displacement and write the table into the page."""
+    drawn, shipped, rows, parts = draw_starts(int(starts), SEED), {}, [], []
+    for name, settled in variants(drawn):
+        physical_outcomes(settled, LDVS, VELOCITIES[0], 1.0, effort=Parts(settled))  # compiles before the clock starts
+        cells, begin = [], process_time()
+        for velocity in VELOCITIES:
+            divided = Parts(settled)
+            (duration,) = observation_duration("walk", [velocity], settled.stride)
+            outcomes = physical_outcomes(settled, LDVS, velocity, duration, effort=divided)
+            fell = np.isfinite(outcomes.fall)
+            difference, low, high = paired_difference(fell, shipped.setdefault(velocity, fell))
+            paired = "" if name == SHIPPED else f"{difference:+.3f} ({low:+.3f} to {high:+.3f})"
+            lengths, along = divided.speeds()
+            slip = f"{outcomes.slip.mean():.2f} ({lengths[1]:.2f} + {lengths[3]:.2f})"
+            cells += [f"{fell.mean():.3f}", paired, slip]
+            parts.append([name, str(velocity), *(f"{a:.2f} ({b:.2f})" for a, b in zip(lengths, along, strict=True))])
+        spent = process_time() - begin
+        rows.append([name, *cells, f"{spent / shipped.setdefault('time', spent):.1f}"])
+        print(*rows[-1], sep="  ", flush=True)
+    print_table(["setting", "V", *(f"{part} (its component along the displacement) [mm/s]" for part in PARTS)], parts)
+    columns = "|".join(f"falls, V = {v}|difference|slip (landing + creep)" for v in VELOCITIES)
+    before, _, after = Path(page).read_text(encoding="utf-8").partition(BEGIN)
+    found = table(f"setting|{columns}|time", rows) + f"\nLDVS, V_p = 80 mm/s, {starts} starts of seed {SEED}.\n"
+    write_text(Path(page), before + BEGIN + found + END + after.partition(END)[2])
 
 
 if __name__ == "__main__":

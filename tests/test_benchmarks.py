@@ -1,7 +1,5 @@
 """Peers of the benchmarks give hexmj's answers, and the scripts run at a small size."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,8 @@ from benchmarks.peers import numba_first_loss, numpy_first_loss
 from benchmarks.table import rows
 from hexmj import LDVS, Acceleration, Stride, draw_starts, first_loss
 from hexmj.controllers.cruse1998.weights import general
+from hexmj.measures.physical import physical_outcomes
+from hexmj.physics.settle import settle
 
 
 @pytest.mark.slow
@@ -50,14 +50,28 @@ def test_a_ratio_above_one_is_in_favour_of_hexmj():
     ]
 
 
+def test_parts_of_the_displacement_add_up():
+    """Landing and creep are the slip; along the displacement, they and rolling add up to it."""
+    settled = settle(draw_starts(3, 1))
+    divided = solver_settings.Parts(settled)
+    outcomes = physical_outcomes(settled, LDVS, 0.7, 20.0, effort=divided)
+    lengths, along = divided.speeds()
+    assert lengths[1] + lengths[3] == pytest.approx(outcomes.slip.mean())
+    assert along[1:].sum() == pytest.approx(along[0]) == pytest.approx(lengths[0])
+
+
 @pytest.mark.slow
 def test_solver_settings_and_scaling_of_a_few_starts(tmp_path, monkeypatch):
-    """Settings that only concern speed change no outcome."""
-    monkeypatch.setattr(solver_settings, "ROUNDS", 1)
-    monkeypatch.setattr(solver_settings, "OPTIONS", {"as shipped": {}})
-    solver_settings.main(str(tmp_path), "4")
-    results = json.loads((tmp_path / "solver_settings.json").read_text(encoding="utf-8"))
-    for name in ("flss", "slip"):
-        assert results["pairs searched for"][name] == results["as shipped"][name]
+    """The table replaces what stands between its comments."""
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{solver_settings.BEGIN}old\n{solver_settings.END}\nafter\n", encoding="utf-8")
+    monkeypatch.setattr(solver_settings, "FRICTION", {})
+    solver_settings.main("2", str(page))
+    assert [page.read_text(encoding="utf-8").count(text) for text in ("before", "old", "after", "discrete")] == [
+        1,
+        0,
+        1,
+        3,
+    ]
     scaling.main(["--out", str(tmp_path), "--share", "0.003"])
     assert (tmp_path / "scaling.png").stat().st_size > 10_000
