@@ -14,6 +14,7 @@ from hexmj.cli.options import Figures, Output, Planning, Threads, build, control
 from hexmj.cli.output import Column, four_digits, grid, report_line
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
+from hexmj.controllers.wrappers import by_protocol
 from hexmj.measures.tables import Measure
 
 if TYPE_CHECKING:
@@ -195,7 +196,8 @@ class Compare(StudyCommand):
         v = float(velocities[np.abs(velocities - 0.3).argmin()])
         data = result.sel(controller=name, velocity=v)
         start = int(np.argmax((np.isinf(data.planned_loss) & np.isinf(data.fall)).values))
-        first = build(Start, given, controller=controller(given, given.controller[0]), velocity=v, start=start)
+        begun = by_protocol(controller(given, given.controller[0]), given.protocol)
+        first = build(Start, given, controller=begun, velocity=v, start=start)
         walked = first.recorded(True, name, given.threads)
         return [save_recording(walked, given.out / "recording.nc"), *filmed(given.out / "gait.mp4", [walked])]
 

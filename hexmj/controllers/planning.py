@@ -57,7 +57,7 @@ def begin(
         if type(error) is not InputError:
             raise
         raise Refused(*error.args) from error
-    check_plan(plan, x, stride)
+    check_plan(plan, plan.starts if hasattr(plan, "y") else x, stride)
     return plan
 
 

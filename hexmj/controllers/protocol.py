@@ -24,11 +24,12 @@ class Plan(Protocol):
     A plan that sets the height of the feet may have an attribute `made_for`, the `Conditions` it is made for; physical
     walks under other conditions then raise InputError. A plan may have methods `first_losses(steps)` and
     `first_tips(steps, pendulum)`; one of them is called once, at time 0, and gives the result of
-    `planning.planned_losses` or `planned_tips` faster.
+    `planning.planned_losses` or `planned_tips` faster. A plan with an attribute `y` begins after a
+    warm-up: `starts` and `y`, (start, leg) [mm], are the tips after it, not the starts that `begin` received.
     """
 
     starts: np.ndarray
-    """(start, leg) tips at time 0 on their own axes, all standing [mm]."""
+    """(start, leg) tips at time 0 on their own axes, on which an insect stands [mm]."""
     stride: Stride
     """Step range, lines of the tips and time step."""
     done: int
@@ -99,7 +100,7 @@ class SteerablePlan(Plan, Protocol):
         ...
 
     def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
-        """Put the starts where `which`, (start,), is True at time 0, all legs standing at `tips`, (start, leg) [mm].
+        """Put the starts where `which`, (start,), is True at time 0, with feet at `tips`, (start, leg) [mm].
 
         From then on they walk, to the last bit, like a new plan from `begin` that starts at `tips`.
         """

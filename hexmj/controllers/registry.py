@@ -15,7 +15,7 @@ import numpy as np
 
 from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.baselines.evolved import EVOLVED, FOUND
-from hexmj.controllers.cruse1998 import OWN_TABLES, PRESETS, read_network
+from hexmj.controllers.cruse1998 import LDVS, OWN_TABLES, PRESETS, TripodLifted, read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
 from hexmj.files import SEARCHED, read_toml
@@ -23,6 +23,9 @@ from hexmj.validate import short
 
 ENTRY_POINTS = "hexmj.controllers"
 """Group of the entry points with which other packages register controllers: a name and `module:object`."""
+
+NAMED: dict[str, Controller] = PRESETS | BASELINES | {"ldvs-tripod": TripodLifted(LDVS.weights, name="ldvs-tripod")}
+"""Name -> controller of this package: the presets, the baselines, and LDVS with one tripod lifted at time 0."""
 
 VARIED = re.compile(r"(?P<name>.+?)(?P<parts>(-(without|with)-\d)+)")
 """Pattern of a controller's name that switches mechanisms or rules off or on, such as ldvs-without-3."""
@@ -32,7 +35,7 @@ def load_controller(name: str) -> Controller:
     """Return a controller by its name.
 
     Args:
-        name: a preset, a baseline, or an entry point of the group `ENTRY_POINTS`; such a name with ``-without-N``
+        name: a name in `NAMED`, or an entry point of the group `ENTRY_POINTS`; such a name with ``-without-N``
             switches mechanism or rule N off (``ldvs-without-3``), with ``-with-N`` mechanism 2 or 4 on
             (``ldvs-with-2``). Or ``module:object`` or ``file.py:object``: a controller, or a class whose fields all
             have defaults. Or a TOML file with the weights of a 1998 network, or with the name of a `controller` and a
@@ -42,8 +45,8 @@ def load_controller(name: str) -> Controller:
     Raises:
         InputError: the name, file, module or object does not exist, or the object is not a controller.
     """
-    if name in PRESETS or name in BASELINES:
-        return PRESETS.get(name) or BASELINES[name]
+    if name in NAMED:
+        return NAMED[name]
     where, _, what = name.rpartition(":")
     if where and what.isidentifier():
         return _object(where, what, name)
@@ -67,8 +70,8 @@ def load_controller(name: str) -> Controller:
 
 
 def known_names() -> Iterator[str]:
-    """Yield the names of the presets, the baselines and the entry points."""
-    yield from dict.fromkeys([*PRESETS, *BASELINES, *(point.name for point in entry_points(group=ENTRY_POINTS))])
+    """Yield the names in `NAMED` and of the entry points."""
+    yield from dict.fromkeys([*NAMED, *(point.name for point in entry_points(group=ENTRY_POINTS))])
 
 
 def parameter_file(name: str) -> Path | None:

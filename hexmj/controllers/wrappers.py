@@ -1,20 +1,27 @@
-"""Controllers that wrap another controller: base classes, a lost leg, and noisy or delayed senses."""
+"""Controllers that wrap another controller: base classes, a warm-up, a lost leg, and noisy or delayed senses."""
 
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from hexmj.controllers.planning import check_velocities
+from hexmj.controllers.planning import HELD, advanced, begin, check_velocities
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, check_controller_type
 from hexmj.errors import InputError
-from hexmj.timing import Stride
+from hexmj.timing import Stride, steps_within
 from hexmj.validate import number, whole
 from hexmj.walks import PlannedWalk
 
 RISE = 3.0
 """Speed at which the lost leg is raised at the beginning of the walk [mm / time unit]: three times V_p."""
+
+Begins = Literal["random", "steady"]
+"""Where walks begin: at random starts, or in the steady state that the plan reaches from them in a warm-up."""
+
+WARM_UP = 10.0
+"""Duration of the warm-up [periods of a single leg]. Of 16 controllers at V = 0.3 and 0.5 (100 starts, seed 66), all
+but tegotae (0.17) then have a kinematic FLSS within 0.11 of that after 30 periods."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,51 @@ class WrappedPlan:
         walk = self._plan.advance(steps)
         self.done = self._plan.done
         return walk
+
+
+@dataclass(frozen=True)
+class FromSteadyState(Wrapper):
+    """A controller whose walks begin after a warm-up in the plan. In physics, all feet stand on the tips at its end.
+
+    Legs that are in swing at the end of the warm-up lift off in the first step.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name of the wrapped controller."""
+        return self.controller.name
+
+    def begin(self, starts, velocity, stride, acceleration=None, threads=None) -> "LatePlan":
+        """See `protocol.Controller.begin`."""
+        if acceleration or not (velocity == velocity[0]).all() or velocity[0] == 0:
+            raise InputError("a warm-up needs one velocity V > 0 for all starts, and no acceleration")
+        plan = begin(self.controller, starts, velocity, stride, threads=threads)
+        return LatePlan(plan, int(steps_within(stride.periods(velocity[0], WARM_UP), stride)))
+
+
+def by_protocol(controller: Controller, protocol: str) -> Controller:
+    """Return the controller whose plans begin where a protocol says."""
+    return FromSteadyState(controller) if protocol == "steady" else controller
+
+
+class LatePlan(WrappedPlan):
+    """A plan whose time 0 is the end of a warm-up."""
+
+    def __init__(self, plan: Plan, late: int) -> None:
+        """Advance a plan at time 0 by a warm-up of `late` steps."""
+        while plan.done < late - 1:
+            advanced(plan, min(max(1, HELD // len(plan.starts)), late - 1 - plan.done))
+        super().__init__(plan)
+        last = advanced(plan, 1)
+        self.starts, self.y, self.done, self._late = last.x[0], last.y[0], 0, late
+        if isinstance(plan, FeedbackPlan):
+            self.sense = plan.sense
+
+    def advance(self, steps: int) -> PlannedWalk:
+        """Return the next steps; time counts from the end of the warm-up."""
+        walk = super().advance(steps)
+        self.done -= self._late
+        return replace(walk, time=np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
+from hexmj.controllers.wrappers import Begins
 from hexmj.legs import LEGS
 from hexmj.measures import tables
 from hexmj.measures.study import Study, outcome_table
@@ -50,6 +51,9 @@ class Comparison(Study):
     """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
     acceleration: Acceleration | None = None
     """The accelerating procedure of Eq. 11; without it the velocity is constant."""
+    protocol: Begins = field(default="random", kw_only=True)
+    """Where walks begin: at 'random' starts, or in the 'steady' state that the plan reaches from them in ten periods of
+    a leg. The insect then begins with all feet on the tips of the plan, and losses and time count from there."""
     n_starts: int = field(default=60, kw_only=True)
     """Number of random starts, the same for every controller and velocity."""
 
@@ -102,6 +106,7 @@ def compare(
     conditions: Conditions = Comparison.conditions,
     stride: Stride = Comparison.stride,
     acceleration: Acceleration | None = None,
+    protocol: Begins = Comparison.protocol,
     folder: Path | None = None,
     **how: Unpack[Execution],
 ) -> "xr.Dataset":
@@ -116,6 +121,7 @@ def compare(
         conditions: V_p, body, ground and contacts of the physical walks.
         stride: step range, lines of the tips and time step.
         acceleration: the accelerating procedure of Eq. 11; without it V_r is constant.
+        protocol: 'random' or 'steady', see `Comparison.protocol`; 'steady' allows no acceleration.
         folder: directory in which finished cells are cached; None caches nothing.
         how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
 
@@ -132,7 +138,7 @@ def compare(
     named = controllers if isinstance(controllers, Mapping) else {getattr(controllers, "name", "?"): controllers}
     walks: Any = {"n_starts": n_starts, "seed": seed, "conditions": conditions, "stride": stride}
     walks |= {"velocities": np.atleast_1d(velocities).tolist(), "observation_time": observation_time}
-    return run_study(Comparison(named, acceleration=acceleration, **walks), folder, **how)
+    return run_study(Comparison(named, acceleration=acceleration, protocol=protocol, **walks), folder, **how)
 
 
 def physical_flss(

@@ -50,6 +50,8 @@ def caption(result: "xr.Dataset", least: int | None = None) -> str:
     if (time := recorded.get("observation_time")) is not None:
         length = f"{time:g} time units" if isinstance(time, float) else TIMES.get(time, time)
         words.append(f"observation time: {length}")
+    if recorded.get("protocol") == "steady":
+        words.append("from steady state")
     if "seed" in recorded:
         words.append(f"seed {recorded['seed']}")
     if acceleration := recorded.get("acceleration"):

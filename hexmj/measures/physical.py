@@ -14,7 +14,7 @@ from hexmj.measures.kinematic import dynamic_losses
 from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar, WalkSoFar, grounded
 from hexmj.physics.pushes import Push
 from hexmj.physics.rollout import drive
-from hexmj.physics.settle import Settled, Settling
+from hexmj.physics.settle import Settled, settle_plan
 from hexmj.progress import Progress, progress_bar
 from hexmj.timing import Acceleration, Stride, steps_within
 from hexmj.walks import PlannedWalk, Walk, copied, extent, footfall_html, joined, part_of
@@ -103,8 +103,8 @@ def physical_walk(
     check_ground(conditions)
     kinematic = begin(controller, starts, velocity, stride, acceleration, threads)
     planned = advanced(kinematic, int(steps_within(duration, stride)))
-    settled = Settling(conditions, stride, threads, pushes=forces).at(starts)
-    plan = begin(controller, settled.starts, velocity, stride, acceleration, threads=1)
+    settled = settle_plan(kinematic, conditions, threads, pushes=forces)
+    plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
     with progress_bar("walking") if progress is True else nullcontext(progress or None) as advance:
         return physical_walk_of_plan(settled, plan, planned, threads=threads, progress=advance)
 
@@ -145,6 +145,7 @@ def physical_outcomes(
     velocity: ArrayLike,
     duration: float,
     *,
+    starts: np.ndarray | None = None,
     acceleration: Acceleration | None = None,
     effort: EffortSoFar | None = None,
     threads: int | None = None,
@@ -156,12 +157,13 @@ def physical_outcomes(
 
     Args:
         settled: starts at rest, see `settle.settle`; the other arguments are those of `physical_walk`.
+        starts: starts of the plan, by default those at rest, which differ after a warm-up (`wrappers.FromSteadyState`).
         effort: accumulates the work and the torques of these walks; None leaves them out.
 
     Raises:
         InputError, SimulationError: see `rollout.drive`.
     """
-    starts, stride = settled.starts, settled.stride
+    starts, stride = settled.starts if starts is None else starts, settled.stride
     plan = begin(controller, starts, velocity, stride, acceleration, threads=1)
     walks: Any = {"stride": stride, "acceleration": acceleration, "threads": threads}
     lost = dynamic_losses(starts, controller, velocity, duration, conditions=settled.conditions, **walks)

@@ -3,20 +3,21 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 import numpy as np
 
 from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.planning import check_velocities
+from hexmj.controllers.planning import begin, check_velocities
 from hexmj.controllers.protocol import Controller, settings_of
+from hexmj.controllers.wrappers import Begins, FromSteadyState, by_protocol
 from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
 from hexmj.io import attributes
 from hexmj.measures.tables import WalkSettings, observed, over_start, settings
 from hexmj.progress import Progress
 from hexmj.starts import check_draw, draw_starts
 from hexmj.timing import Acceleration, Stride
-from hexmj.validate import distinct
+from hexmj.validate import choice, distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +41,7 @@ class Study:
     """Settings that all studies share; every cell of a study walks from the same starts.
 
     A subclass adds `controller` or `controllers`, and `velocity` or `velocities` unless its velocities are fixed. It
-    adds `observation_time` and `acceleration` only if users may choose them.
+    adds `observation_time`, `acceleration` and `protocol` only if users may choose them.
     """
 
     n_starts: int = 100
@@ -52,6 +53,7 @@ class Study:
 
     hidden: ClassVar[tuple[str, ...]] = ()
     """Conditions that the study sets itself; in `conditions` they must have their defaults."""
+    protocol = "random"  # see `wrappers.Begins`
 
     def __post_init__(self) -> None:
         check_draw(self.n_starts, self.seed)
@@ -64,7 +66,9 @@ class Study:
                 raise InputError(f"{name} = {given[name]}; expected {default[name]}, since the study sets it itself")
         if "ground" not in self.set_by_study:
             check_ground(self.conditions)
-        _ = self.observed
+        choice("protocol", self.protocol, get_args(Begins))
+        if (self.procedure or 0 in self.observed[0]) and self.protocol == "steady":
+            raise InputError("protocol = steady has no walks that accelerate or stand still; use the protocol random")
 
     @property
     def set_by_study(self) -> tuple[str, ...]:
@@ -94,7 +98,7 @@ class Study:
         self, velocity: float, duration: float, conditions: Conditions, controller: Controller | None = None
     ) -> WalkSettings:
         """Return the settings of a cell in which all starts walk with a controller, by default the study's first."""
-        controller = controller or next(iter(self.plans().values()))
+        controller = by_protocol(controller or next(iter(self.plans().values())), self.protocol)
         same = self.n_starts, self.seed, conditions, self.stride, self.procedure
         return WalkSettings(controller, velocity, duration, *same)
 
@@ -103,7 +107,7 @@ class Study:
         from hexmj.physics.settle import check_adhesion
 
         for controller in self.plans().values():
-            check_velocities(controller, velocities, self.stride, self.procedure)
+            check_velocities(by_protocol(controller, self.protocol), velocities, self.stride, self.procedure)
         for varied in conditions:
             check_adhesion(varied, self.stride, self.seed)
 
@@ -118,7 +122,8 @@ class Study:
         time = getattr(self, "observation_time", "walk")
         shared = settings(self.plans(), time, self.n_starts, self.seed, self.stride, self.procedure)
         conditions = {k: v for k, v in self.conditions.settings().items() if k not in self.set_by_study}
-        return table.assign_attrs(attributes({"study": study} | shared | own | {"conditions": conditions}))
+        made = {"study": study, "protocol": self.protocol} | shared | own | {"conditions": conditions}
+        return table.assign_attrs(attributes(made))
 
 
 @lru_cache(maxsize=1)
@@ -174,8 +179,13 @@ def kept_walk(walks: WalkSettings, starts: np.ndarray, **execution: Any) -> "Phy
 def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
     """Return every field of `Outcomes`, (start,), of the physical walks with these settings."""
     from hexmj.measures.physical import physical_outcomes
+    from hexmj.physics.settle import settle_plan
 
-    settled = settled_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
-    how: Any = {"acceleration": walks.acceleration, "threads": threads, "progress": progress}
+    if isinstance(walks.controller, FromSteadyState):
+        plan = begin(walks.controller, walks.starts, walks.velocity, walks.stride, threads=threads)
+        settled = settle_plan(plan, walks.conditions, threads)
+    else:
+        settled = settled_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
+    how: Any = {"starts": walks.starts, "acceleration": walks.acceleration, "threads": threads, "progress": progress}
     outcomes = physical_outcomes(settled, walks.controller, walks.velocity, walks.duration, **how)
     return over_start(vars(outcomes), UNITS)

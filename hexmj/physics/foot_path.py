@@ -36,10 +36,10 @@ AHEAD = 8
 class TipTargets:
     """Targets of the tips of many starts, computed from successive steps of a plan."""
 
-    def __init__(self, starts: np.ndarray, conditions: Conditions, stride: Stride) -> None:
-        """Begin with all feet standing at the starts, (start, leg) [mm]."""
+    def __init__(self, starts: np.ndarray, conditions: Conditions, stride: Stride, y: np.ndarray | None = None) -> None:
+        """Begin with all feet standing at the starts, (start, leg), and at `y`, by default the legs' lines [mm]."""
         self._x = np.array(starts, order="C")
-        self._y = np.tile(stride.geometry.y, (len(starts), 1))
+        self._y = np.tile(stride.geometry.y, (len(starts), 1)) if y is None else np.array(y, order="C")
         self._stance = np.ones(starts.shape, dtype=bool)
         self._lift, self._height = np.zeros(starts.shape), np.zeros(starts.shape)
         self._substeps = conditions.substeps(stride)
@@ -108,7 +108,7 @@ class OrdersFromPlan:
         self._plan, self._settled, self._substeps = plan, settled, settled.substeps
         self.steps, self._done = int(steps_within(duration, settled.stride)), 0
         self._chunk, self._planned = steps_in_chunk(self._substeps, divisor), list[PlannedWalk]()
-        self._follow = TipTargets(settled.starts, settled.conditions, settled.stride).follow
+        self._follow = TipTargets(settled.starts, settled.conditions, settled.stride, settled.tips[..., 1]).follow
         self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
         self.tips = settled.tips.copy()
 

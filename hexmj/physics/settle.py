@@ -11,6 +11,7 @@ from hexmj.bodies.kinematics import standing_tips
 from hexmj.bodies.mjcf import check_home, compile_body
 from hexmj.body import ROOT_QPOS
 from hexmj.conditions import Conditions
+from hexmj.controllers.protocol import Plan
 from hexmj.errors import InputError, OutOfReach, SimulationError
 from hexmj.physics.engine import Diverged, MujocoBatch, walk_error
 from hexmj.physics.substeps import SINK
@@ -75,21 +76,23 @@ class Settling:
         check_home(self._compiled)
         self._batch: MujocoBatch | None = None
 
-    def at(self, starts: ArrayLike, names: np.ndarray | None = None) -> Settled:
+    def at(self, x: np.ndarray, names: np.ndarray | None = None, y: np.ndarray | None = None) -> Settled:
         """Return the settled starts.
 
         Args:
-            starts: planned tips, (start, leg) [mm].
+            x: planned tips on their own axes, (start, leg) [mm].
             names: indices of the starts in error messages, (start,), by default their rows.
+            y: distances of the tips from the body axis, left positive, (start, leg) [mm]; by default the legs' lines.
 
         Raises:
             InputError, SimulationError: see `settle`.
         """
         conditions, stride, compiled, batch = self.conditions, self.stride, self._compiled, self._batch
-        x = checked_starts(starts, stride)
         names = np.arange(len(x)) if names is None else names
         model, columns, height = compiled.model, compiled.columns, conditions.standing_height
         tips = standing_tips(x, height, stride)
+        if y is not None:
+            tips[..., 1] = y
         joints, reachable = compiled.inverse(tips)
         if not reachable.all():
             start, leg = np.argwhere(~reachable)[0]
@@ -134,7 +137,13 @@ def settle(
         InputError: a start is out of reach, posture home does not fit the body, or the adhesion is too strong.
         SimulationError: a start does not settle: it still moves, a foot is off the ground, or the trunk touches it.
     """
-    return Settling(conditions or Conditions(), stride or Stride(), threads).at(starts)
+    stride = stride or Stride()
+    return Settling(conditions or Conditions(), stride, threads).at(checked_starts(starts, stride))
+
+
+def settle_plan(plan: Plan, conditions: Conditions, threads: int | None = None, pushes: bool = False) -> Settled:
+    """Put the insect on the tips at which a plan begins; see `settle`, and `Settling` for `pushes`."""
+    return Settling(conditions, plan.stride, threads, pushes).at(plan.starts, y=getattr(plan, "y", None))
 
 
 def check_adhesion(conditions: Conditions, stride: Stride, seed: int) -> None:

@@ -8,7 +8,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.planning import begin, check_velocities
 from hexmj.controllers.protocol import Controller, FeedbackPlan, SteerableController
-from hexmj.controllers.wrappers import LegLost, PoorSenses
+from hexmj.controllers.wrappers import Begins, LegLost, PoorSenses, by_protocol
 from hexmj.errors import InputError
 from hexmj.measures.study import GROUND
 from hexmj.starts import draw_starts
@@ -71,6 +71,10 @@ class League(ControllerStudy):
     observation_time: str | float = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
 
+    protocol: Begins = "random"
+    """Where kinematic and physical walks at constant V begin: at 'random' starts, or in the 'steady' state that the
+    plan reaches from them in ten periods of a leg. Ideal starts, accelerating walks and trials do not change."""
+
     hidden: ClassVar[tuple[str, ...]] = ("load", *GROUND)
 
     def __post_init__(self) -> None:
@@ -119,9 +123,10 @@ class League(ControllerStudy):
             return question, Cell(f"{name} {question}", getattr(own_walks, method), own, work)
 
         for v, time in zip(*(axis.tolist() for axis in self.observed), strict=True):
-            at = {"velocity": v, "duration": time}
-            yield cell(f"kinematic {v}", time * KINEMATIC_COST, "losses", at)
-            yield cell(f"physics {v}", time, "outcomes", at | physics)
+            at: dict[str, Any] = {"velocity": v, "duration": time}
+            begun = at if ideal else at | {"controller": by_protocol(controller, self.protocol)}
+            yield cell(f"kinematic {v}", time * KINEMATIC_COST, "losses", begun)
+            yield cell(f"physics {v}", time, "outcomes", begun | physics)
             if not ideal:
                 few = at | {"n_starts": min(every, MOST_GAIT_STARTS)}
                 yield cell(f"gait {v}", 25 * time * KINEMATIC_COST, "gaits", few, periods=self.periods)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hexmj.controllers.baselines import BASELINES
+from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import VARIED, known_names, load_controller
 from hexmj.errors import InputError
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 IDEAL = "-ideal"
 """Suffix of the name of an entrant that walks from its ideal start instead of random starts."""
 
-NETWORK = ("uncoordinated", "hws", "ldvs", "own", "own-0.3", "own-0.5", "robust-0.1", "lasting", "lasting-0.3")
+OWN = ("own", "own-0.3", "own-0.5", "robust-0.1", "lasting", "lasting-0.3")
+NETWORK = ("uncoordinated", "hws", "ldvs", "ldvs-tripod", *OWN)
 """Weight sets of the 1998 network that take part in the league."""
 
 EVERYONE = (*NETWORK, *BASELINES, *(f"{name}{IDEAL}" for name in ("wilson", "graham")))
@@ -159,15 +161,16 @@ class EntrantWalks(WalkSettings):
         """
         from hexmj.measures.physical import physical_outcomes
         from hexmj.physics.outcomes import EffortSoFar, Outcomes
-        from hexmj.physics.settle import settle
+        from hexmj.physics.settle import settle, settle_plan
 
         starts, conditions, stride = self.starts, self.conditions, self.stride
         columns = {field.name: UNITS.get(field.name, "1") for field in fields(Outcomes)} | EFFORT
 
         def walked(which: np.ndarray) -> "xr.Dataset":
-            settled = settle(starts[which], conditions, stride, threads)
+            plan = begin(self.controller, starts[which], self.velocity, stride, threads=threads)
+            settled = settle_plan(plan, conditions, threads)
             effort = EffortSoFar(settled)
-            how: Any = {"threads": threads, "effort": effort}
+            how: Any = {"starts": starts[which], "threads": threads, "effort": effort}
             outcomes = physical_outcomes(settled, self.controller, self.velocity, self.duration, **how)
             costs = {"work": effort.work / settled.compiled.weight, "torque": effort.torque}
             time = int(steps_within(self.duration, stride)) * stride.dt

@@ -1,7 +1,7 @@
 """Baseline controllers from the literature, one per file; all are built on the base class in `lifted`."""
 
 from hexmj.controllers.baselines.evolved import EVOLVED
-from hexmj.controllers.baselines.metronomes import Metronome
+from hexmj.controllers.baselines.metronomes import Metronome, RandomPhase
 from hexmj.controllers.baselines.phase_oscillators import PhaseOscillators
 from hexmj.controllers.baselines.righetti import Righetti
 from hexmj.controllers.baselines.scores import Scores
@@ -14,6 +14,7 @@ BASELINES: dict[str, Controller] = {
     for controller in (
         Metronome("wilson", "wilson"),
         Metronome("graham", "graham"),
+        RandomPhase("graham", "graham-random"),
         Walknet(),
         Walknet("walknet-reacog", REACOG),
         Walknet("walknet-load", rules=(1, 2, 3, 5)),

@@ -6,7 +6,8 @@ in anti-phase.  Graham's Gait I: the tripod at every velocity.
 
 Mapping: the period is (AEP_0 - PEP_0) (1 + 1/V), in which a swing goes from PEP_0 to AEP_0 at V_p. Fitted by us:
 nothing. Sensed: nothing, not even the tips at time 0. The clock is at 0 when the walk begins, and the first step lifts
-each leg whose swing has begun by then. From `ideal_start` every leg is in phase with the clock.
+each leg whose swing has begun by then. From `ideal_start` every leg is in phase with the clock. With a random phase,
+the clock begins at a time that depends on the start, and lifts each leg at its next beat.
 """
 
 from dataclasses import dataclass
@@ -65,6 +66,16 @@ class Metronome(Lifted):
         """Return the lag of each leg behind the clock, (start, leg) [periods]."""
         behind = np.full_like(v, 0.5) if self.wave == "graham" else _swing_part(v)
         return BEHIND * behind + RIGHT
+
+
+@dataclass(frozen=True)
+class RandomPhase(Metronome):
+    """A metronome that begins at a phase which depends on the start, and lifts each leg at its next beat."""
+
+    def at_start(self, legs: Legs) -> Clock:
+        """Begin at the fractional part of the first tip's position in units of 0.1 um; see `Lifted.at_start`."""
+        phase = legs.x[:, :1] * 1e4 % 1.0
+        return Clock(phase, np.floor(phase - self._lag(legs.v)))
 
 
 def _swing_part(v: np.ndarray) -> np.ndarray:

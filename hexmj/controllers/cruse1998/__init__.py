@@ -4,6 +4,7 @@ from hexmj.controllers.cruse1998.network import MODEL_VARIANTS as MODEL_VARIANTS
 from hexmj.controllers.cruse1998.network import Cruse1998 as Cruse1998
 from hexmj.controllers.cruse1998.network import ModelVariant as ModelVariant
 from hexmj.controllers.cruse1998.network import Order as Order
+from hexmj.controllers.cruse1998.network import TripodLifted as TripodLifted
 from hexmj.controllers.cruse1998.network import named_variant as named_variant
 from hexmj.controllers.cruse1998.network import variant_name as variant_name
 from hexmj.controllers.cruse1998.presets import HWS as HWS

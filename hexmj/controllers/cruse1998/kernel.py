@@ -48,8 +48,9 @@ _P1_REAR, _P1_CONTRA, _P2_REAR, _P4_FRONT = range(0, 24, 6)
 _P31_FRONT, _P32_FRONT, _P33_FRONT, _P34_FRONT = range(24, 48, 6)
 _P31_CONTRA, _P32_CONTRA, _P33_CONTRA, _P34_CONTRA = range(48, 72, 6)
 
-# Indices into the constants `k`: AEP_0, PEP_0, PEP_min, dt, V_r(0), a, six origins of axes, 1 / |y| and y of six lines.
-_AEP0, _PEP0, _PEP_MIN, _DT, _V_START, _RATE, _ORIGIN, _PER_Y, _Y = 0, 1, 2, 3, 4, 5, 6, 12, 18
+# Indices into the constants `k`: AEP_0, PEP_0, PEP_min, dt, V_r(0), a, six origins of axes, 1 / |y| and y of six lines,
+# and whether each leg stands at time 0.
+_AEP0, _PEP0, _PEP_MIN, _DT, _V_START, _RATE, _ORIGIN, _PER_Y, _Y, _STANDS = 0, 1, 2, 3, 4, 5, 6, 12, 18, 24
 
 # Indices into `rules`, the choices of `network.Order` and `network.ModelVariant`.  A choice is the length of a tuple,
 # and so part of its type: numba compiles each combination separately, without branches for the other choices.
@@ -251,10 +252,10 @@ def _step(z, order, p, k, rules):
 
 @part
 def _begin(z, j, start, v, v_final, steps, k):
-    """Put a start at time 0 into lane j: Delta = 0, AEP = AEP_0, s(-dt) = s(0), all legs stand."""
+    """Put a start at time 0 into lane j: Delta = 0, AEP = AEP_0, s(-dt) = s(0)."""
     for leg in range(6):
         z[(X + leg) * LANES + j] = start[leg]
-        z[(S + leg) * LANES + j] = z[(S_OLD + leg) * LANES + j] = 1.0
+        z[(S + leg) * LANES + j] = z[(S_OLD + leg) * LANES + j] = k[_STANDS + leg]
         z[(AEP + leg) * LANES + j] = k[_AEP0]
         z[(PEP_SHIFT + leg) * LANES + j] = z[(AEP_SHIFT + leg) * LANES + j] = 0.0
     z[V * LANES + j], z[V_FINAL * LANES + j] = v, v_final

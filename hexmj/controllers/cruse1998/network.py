@@ -7,7 +7,7 @@ AEP(0) = AEP_0 and s(-dt) = s(0), where the paper is silent. The module `kernel`
 
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, Literal, get_args, get_type_hints
+from typing import Any, ClassVar, Literal, get_args, get_type_hints
 
 import numpy as np
 
@@ -92,6 +92,9 @@ class Cruse1998:
     model_variant: ModelVariant = field(default_factory=ModelVariant)
     """Interpretation of the rules that the paper leaves open."""
 
+    stands: ClassVar[tuple[float, ...]] = (1.0,) * 6
+    """State s(0) of each leg: 1 if it stands at time 0, 0 if it swings."""
+
     def __post_init__(self) -> None:
         choice("order", self.order, get_args(Order))
         if not isinstance(self.weights, AnyWeights):
@@ -100,8 +103,10 @@ class Cruse1998:
     @property
     def mirrored(self) -> bool:
         """Whether mirrored starts give mirrored walks: the legs move at once, and both sides have equal weights."""
+        if self.order == "sequential" or 0.0 in self.stands:
+            return False
         matrices = [getattr(general(self.weights), kind) for kind in NEIGHBOURS]
-        return self.order != "sequential" and all(np.array_equal(w, w[MIRROR, :][:, MIRROR]) for w in matrices)
+        return all(np.array_equal(w, w[MIRROR, :][:, MIRROR]) for w in matrices)
 
     def without(self, mechanism: int) -> "Cruse1998":
         """Return the network without one of the mechanisms 1 to 4; its name ends with ``-without-N``.
@@ -154,11 +159,19 @@ class Cruse1998:
         table += [(p, source) for source in (kernel.FRONT, kernel.CONTRA) for p in (w.p31, w.p32, w.p33, w.p34)]
         p = np.concatenate([matrix[d, source] for matrix, source in table])
         eq11 = (acceleration.start, acceleration.rate) if acceleration else (0.0, 0.0)
-        k = np.array([stride.aep0, stride.pep0, stride.pep_min, stride.dt, *eq11, *g.origin, *(1 / np.abs(g.y)), *g.y])
+        lines = *g.origin, *(1 / np.abs(g.y)), *g.y
+        k = np.array([stride.aep0, stride.pep0, stride.pep_min, stride.dt, *eq11, *lines, *self.stands])
         chosen: list[tuple[Any, str]] = [(Order, self.order)]
         chosen += [(hint, getattr(self.model_variant, name)) for name, hint in get_type_hints(ModelVariant).items()]
         rules = tuple((0,) * get_args(names).index(value) for names, value in chosen)
         return tuple(p.tolist()), tuple(k.tolist()), rules
+
+
+@dataclass(frozen=True)
+class TripodLifted(Cruse1998):
+    """The network with the legs L1, R2 and L3 in swing at time 0."""
+
+    stands = (0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
 
 
 @dataclass(eq=False)
@@ -263,7 +276,8 @@ class NetworkPlan:
 
     def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
         """See `protocol.SteerablePlan`."""
-        legs = {kernel.X: tips, kernel.S: 1.0, kernel.S_OLD: 1.0, kernel.AEP: self.stride.aep0}
+        stands = np.array(self.constants[1][-6:])
+        legs = {kernel.X: tips, kernel.S: stands, kernel.S_OLD: stands, kernel.AEP: self.stride.aep0}
         for row, values in (legs | {kernel.PEP_SHIFT: 0.0, kernel.AEP_SHIFT: 0.0}).items():
             self._write(row, np.where(which[:, None], values, self._read(row)))
         self.slow_down(which)
