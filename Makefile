@@ -48,6 +48,8 @@ results: bench
 	.venv/bin/hexmj biology --processes 2
 	.venv/bin/hexmj reproduce --beside lasting --processes 2
 	.venv/bin/hexmj league --processes 2 --no-video
+	.venv/bin/hexmj league --processes 2 --no-video --protocol steady --velocity 0.5 --trial-starts 1 \
+	    --out results/league/steady
 	.venv/bin/python docs/results.py
 
 gallery: .venv/project system

@@ -111,7 +111,7 @@ def _own_sets() -> str:
 
 
 def league(folder: Path) -> list[str]:
-    """Return the table of the league, the fewest falls first, and draw its two figures."""
+    """Return the tables of the league, the fewest falls first, and draw its two figures."""
     result = io.load(folder / "league.nc")
     with as_shipped():
         io.save_figure(hexmj.plot(result), IMAGES / "league.png")
@@ -129,7 +129,19 @@ def league(folder: Path) -> list[str]:
         others = [f"{middle.stable.item():.2f}", frequency(own.sel(trial=STEP), "fell"), f"{tried.cost.item():.2f}"]
         rows.append([name, *(text.replace("nan", "-") for text in (*means, *at_half, *others))])
     head = "controller|FLSS, mean (rank)|falls, mean (rank)|FLSS, V = 0.5|falls, V = 0.5"
-    return [table(f"{head}|stable gaits, V = 0.5|falls, step|cost of transport", rows)]
+    first = table(f"{head}|stable gaits, V = 0.5|falls, step|cost of transport", rows)
+    steady = folder / "steady" / "league.nc"
+    return [first, *([_from_steady_state(result, io.load(steady))] if steady.exists() else [])]
+
+
+def _from_steady_state(*protocols: Any) -> str:
+    """Return FLSS and falls at V = 0.5 from random starts and from steady state, the fewest falls from there first."""
+    random, steady = (result.sel(velocity=[0.5], method="nearest") for result in protocols)
+    rows = []
+    for name in by_rank(steady).entrant.values:
+        both = [result.sel(entrant=name) for result in (random, steady)]
+        rows.append([name, *(frequency(own, measure) for measure in ("kinematic", "physical") for own in both)])
+    return table("controller|FLSS, random|FLSS, steady|falls, random|falls, steady", rows)
 
 
 def biology(folder: Path) -> list[str]:
@@ -171,7 +183,8 @@ def main() -> None:
             continue
         tables = iter(write((results / name).parent))
         before, *parts = page.read_text(encoding="utf-8").split(BEGIN)
-        text = before + "".join(BEGIN + next(tables) + END + part.partition(END)[2] for part in parts)
+        olds = [part.partition(END) for part in parts]
+        text = before + "".join(BEGIN + next(tables, old) + END + rest for old, _, rest in olds)
         page.write_text(text, encoding="utf-8")
         print(f"{page.name}: {len(text.split())} words")
     for path in IMAGES.glob("*.png"):  # 192 colours make a figure three times smaller
