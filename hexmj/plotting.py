@@ -26,7 +26,11 @@ FIGURES: dict[str, dict[str, str]] = {
     "terrain": {"terrain": "studies.terrain:terrain_figure"},
     "disturb": {"disturb": "studies.disturbance:disturbed_figure"},
     "biology": {"biology": "studies.biology:biology_figure"},
-    "league": {"league": "studies.league_figure:league_figure", "walks": "studies.league_figure:walks_figure"},
+    "league": {
+        "league": "studies.league_figure:league_figure",
+        "walks": "studies.league_figure:walks_figure",
+        "prediction": "studies.league_figure:prediction_figure",
+    },
     "ablate": {"ablation": "studies.ablation:ablation_figure"},
     "search": {"convergence": "search.results:convergence_figure"},
     "recording": {"walk": "replay.take:walk_figure"},

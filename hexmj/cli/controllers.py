@@ -47,7 +47,7 @@ class League(StudyCommand):
     planning = ()
     hidden = ("periods", "accelerating")
     data = "league.nc"
-    figures = {"league": "league", "league_walks": "walks"}  # noqa: RUF012
+    figures = {"league": "league", "league_walks": "walks", "prediction": "prediction"}  # noqa: RUF012
     examples = ("--quick", "--controller ldvs mine.py:Mine --velocity 0.5 --no-video")
 
     def build(self, given: SimpleNamespace) -> Any:

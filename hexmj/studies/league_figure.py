@@ -1,4 +1,4 @@
-"""Two figures of the league with a row for each entrant: losses and falls; and trials, gaits and costs."""
+"""Figures of the league: losses and falls; trials, gaits and costs; and how well plans predict falls."""
 
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hexmj.measures.figures import caption, starts_in_words
-from hexmj.plotting import FEWER, MEASURE_STYLES, NOTHING, head, heat_map, in_figure, interval, picture
+from hexmj.plotting import FEWER, LEGEND, MEASURE_STYLES, NOTHING, head, heat_map, in_figure, interval, picture, tidy
 from hexmj.studies.standings import ABOUT_TRIALS, MEASURES, by_rank, from_one, place
 
 if TYPE_CHECKING:
@@ -26,6 +26,10 @@ NOTES = (
 KINEMATIC = MEASURE_STYLES["kinematic"]["color"]
 POINTS = {"range": ("o", KINEMATIC, -0.14), "accelerated": ("D", "white", 0.14)}
 """FLSS that is not given per velocity -> marker, its fill, and vertical shift of its point in the entrant's row."""
+
+
+NAMED = 0.08
+"""Difference between FLDS and frequency of falls beyond which `prediction_figure` names an entrant."""
 
 
 class Panel(NamedTuple):
@@ -75,6 +79,34 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
         bar.ax.tick_params(labelsize=9)
     axes[0].set_xticks(range(shown.sizes["trial"]), shown.trial.values, rotation=90, fontsize=9)
     axes[0].set_xlabel("")
+    return figure
+
+
+def prediction_figure(result: "xr.Dataset") -> "Figure":
+    """Draw the frequency of falls against FLDS and kinematic FLSS near V = 0.5, with a point for each entrant."""
+    at = result.sel(velocity=0.5, method="nearest")
+    at = at.isel(entrant=np.flatnonzero(at.best.sel(measure="physical") > 0))
+    figure, falls = picture(7.0, 6.0), at.physical.values
+    axes = figure.subplots()
+    axes.axline((0.0, 0.0), slope=1.0, color="0.6", linewidth=1.0)
+    away = {}
+    for measure in ("kinematic", "dynamic"):
+        style, filled = MEASURE_STYLES[measure], measure == "dynamic"
+        look: Any = {"color": style["color"], "marker": style["marker"], "label": style["label"], "linestyle": "none"}
+        axes.plot(at[measure], falls, **look, mfc=style["color"] if filled else "none", markersize=6)
+        away[measure] = float(np.abs(at[measure].values - falls).mean())
+    for name, x, y in zip(at.entrant.values, at.dynamic.values, falls, strict=True):
+        if abs(x - y) > NAMED:
+            axes.annotate(in_figure(name), (x, y), (6, -3), textcoords="offset points", fontsize=9)
+    axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), aspect="equal")
+    axes.set(xlabel="frequency of losses in the plan", ylabel="frequency of falls")
+    tidy(axes)
+    axes.legend(loc="upper left", **LEGEND)
+    finding = f"the FLDS differs from the frequency of falls by {away['dynamic']:.2f} on average"
+    finding += f", the kinematic FLSS by {away['kinematic']:.2f}"
+    starts = starts_in_words(int(at.physical_starts.max()))
+    conditions = f"V = {at.velocity.item():g}; {starts} of each controller; names: more than {NAMED:g} apart"
+    head(figure, finding, caption(result), conditions)
     return figure
 
 
