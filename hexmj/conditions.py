@@ -130,6 +130,10 @@ class Conditions:
         return self.seconds(stride) / self.substeps(stride)
 
 
+SCALARS = tuple(field.name for field in fields(Conditions) if field.type in (float, int))
+"""Names of the conditions that are numbers."""
+
+
 def unusual(settings: Mapping[str, Any]) -> list[str]:
     """Return the names of the conditions that differ from their defaults or describe the kind of ground.
 

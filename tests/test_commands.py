@@ -66,7 +66,7 @@ def test_every_field_of_a_study_and_its_conditions_is_an_option_or_hidden(name):
     given, conditions = vars(chosen.parse(name, [])), hexmj.Conditions().values()
     expected = {NAMES.get(field.name, field.name) for field in fields(study)} - {*chosen.hidden}
     expected |= ({*conditions} if "conditions" in expected else set()) | {"dt", "geometry"}
-    hidden = {*getattr(study, "hidden", ()), "conditions", "stride"}
+    hidden = {*getattr(study, "hidden", ()), "conditions", "stride", "axes"}
     assert expected - hidden <= {*given}
     assert not {*getattr(study, "hidden", ())} & {*given}
 
@@ -76,7 +76,7 @@ def test_without_options_a_study_has_its_own_defaults(name):
     chosen = command(name)
     study = chosen.build(chosen.parse(name, []))  # pyright: ignore[reportAttributeAccessIssue]
     for field in fields(study):
-        if field.name not in ("controller", "controllers"):
+        if field.name not in ("controller", "controllers", "axes"):
             value = getattr(study, field.name)
             assert value == (tuple(field.default) if isinstance(value, tuple) else field.default)  # pyright: ignore
 
@@ -91,6 +91,10 @@ def test_options_reach_the_settings():
     assert study.conditions == hexmj.Conditions(vp=40.0, load=1.0)
     assert study.stride == hexmj.Stride(dt=0.2, geometry=hexmj.CENTRED)
     assert study.acceleration == hexmj.Acceleration(0.01)
+    words = "--vp 40 80 --centre-of-mass -2 0 --ground rough --ground-seed 3 4 --load 1"
+    study = chosen.build(chosen.parse("compare", words.split()))  # pyright: ignore
+    assert study.axes == {"vp": (40.0, 80.0), "centre_of_mass": (-2.0, 0.0), "ground_seed": (3, 4)}
+    assert study.conditions.load == 1.0
 
 
 def test_version_is_one_line(run):
@@ -141,6 +145,8 @@ BAD = [
     "walk --physical --vp nan",
     "compare --controller nowhere.toml",
     "compare --controller ldvs ldvs",
+    "compare --vp",
+    "compare --vp 40 40",
     "render a.nc b.nc c.nc d.nc e.nc f.nc g.nc",
     "render nowhere.nc",
     "render nowhere.nc --beside planned",

@@ -1,5 +1,6 @@
 """The comparison: one cell for each controller and velocity, cached results, and the same bits on any executor."""
 
+import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from typing import Any
@@ -79,6 +80,20 @@ def test_starts_settle_once(monkeypatch):
     assert len(settled) == 2
 
 
+def test_each_point_of_the_axes_equals_a_run_of_its_own(run, tmp_path):
+    axes = {"vp": [320.0, 160.0], "load": [0.0, 0.5]}
+    every = compare(BOTH, [0.5, 0.6], **FEW, axes=axes)
+    assert every.fall.dims == ("controller", "vp", "load", "velocity", "start")
+    for point in ({"vp": 160.0, "load": 0.5}, {"vp": 320.0, "load": 0.0}):
+        alone = compare(BOTH, [0.5, 0.6], **FEW, conditions=Conditions(**point))
+        part = every.sel(point).drop_vars([*point])
+        assert part.assign_attrs(alone.attrs).identical(alone)
+    words = "--velocity 0.5 0.6 --starts 3 --observation-time 10 --vp 320 160 --load 0 0.5 --no-video --json --out"
+    answer = json.loads(run("compare", *words.split(), tmp_path)[1])
+    assert answer["vp"] == [320.0, 160.0] and answer["load"] == [0.0, 0.5]
+    assert answer["ldvs"]["physical"] == every.physical.sel(controller="ldvs").values.tolist()
+
+
 STUDIES = {
     "compare": Comparison(BOTH, [0.6], **FEW),
     "feedback": Comparison({"feedback": SensoryFeedback(LDVS)}, [0.5, 0.6], **FEW),
@@ -110,6 +125,13 @@ def test_processes_and_threads_give_the_same_bits(name, two_processes):
         ("velocities", LDVS, {"velocities": [0.5, 0.5]}),
         ("velocity", LDVS, {"velocities": [1.0]}),
         ("velocity", LDVS, {"velocities": [0.05], "acceleration": Acceleration()}),
+        ("axes", LDVS, {"axes": {"ground": ["flat", "step"]}}),
+        ("axes", LDVS, {"axes": {"velocity": [0.5]}}),
+        ("vp", LDVS, {"axes": {"vp": []}}),
+        ("vp", LDVS, {"axes": {"vp": [40.0, 40]}}),
+        ("vp", LDVS, {"axes": {"vp": [40.0, -1.0]}}),
+        ("vp", LDVS, {"axes": {"vp": [40.0]}, "conditions": Conditions(vp=20.0)}),
+        ("ground_height", LDVS, {"axes": {"ground_height": [1.0]}}),
     ],
 )
 def test_bad_input_is_refused_before_the_work(tmp_path, name, controllers, changed):

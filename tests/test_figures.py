@@ -179,6 +179,14 @@ def test_the_title_names_what_differs_from_the_defaults() -> None:
     assert "null" in shown and NAME[:2] not in shown
 
 
+def test_a_concatenated_result_names_its_coordinates() -> None:
+    result = xr.concat([made("compare").assign_coords(friction=value) for value in (0.2, 0.7)], "friction")
+    assert "friction = 0.2, 0.7" in head_of(result) and "friction = 0.5" not in head_of(result)
+    panels = [axes.get_title().replace("\N{NO-BREAK SPACE}", " ") for axes in hexmj.plot(result).axes]
+    assert len(panels) == 4 and "friction = 0.2" in panels[0] and "friction = 0.7" in panels[-1]
+    assert "friction = 0.7" in head_of(result.sel(friction=0.7))
+
+
 @pytest.mark.parametrize(
     ("lost", "fell", "times_found"), [(1, np.inf, 2), (np.inf, 1, 0), (1, 1, 0)], ids=["lost", "fell", "both"]
 )

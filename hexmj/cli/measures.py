@@ -187,14 +187,16 @@ class Compare(StudyCommand):
     examples = ("", "--controller hws wilson --velocity 0.5 --starts 20 --no-video")
 
     def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
-        """Write a recording and a video of the first controller near V = 0.3, from a start that stays stable if any."""
+        """Write a recording and a video of the first controller, at the first value of each axis and near V = 0.3, from
+        a start that stays stable if any."""
+        from hexmj.measures.figures import axes_of
         from hexmj.replay.recording import Start, save_recording
 
         if given.no_video:
             return []
         name, velocities = str(result.controller.values[0]), result.velocity.values
         v = float(velocities[np.abs(velocities - 0.3).argmin()])
-        data = result.sel(controller=name, velocity=v)
+        data = result.sel(controller=name, velocity=v).isel(dict.fromkeys(axes_of(result), 0))
         start = int(np.argmax((np.isinf(data.planned_loss) & np.isinf(data.fall)).values))
         begun = by_protocol(controller(given, given.controller[0]), given.protocol)
         first = build(Start, given, controller=begun, velocity=v, start=start)
@@ -204,8 +206,9 @@ class Compare(StudyCommand):
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         from hexmj.io import settings
         from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, physical_report
+        from hexmj.measures.figures import axes_of
 
-        summary: dict[str, Any] = {"velocity": result.velocity.values.tolist()}
+        summary = {axis: result[axis].values.tolist() for axis in (*axes_of(result), "velocity")}
         keys = [measure + end for measure in MEASURES | BESIDE for end in ("", "_low", "_high")]
         for name in result.controller.values:
             data = result.sel(controller=name)
@@ -215,8 +218,9 @@ class Compare(StudyCommand):
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.measures.compare import AGREEMENT, MEASURES, physical_report
+        from hexmj.measures.figures import axes_of
 
-        axes, names = ("controller", "velocity"), ("both", "kin.", "phys.", "none")
+        axes, names = ("controller", *axes_of(result), "velocity"), ("both", "kin.", "phys.", "none")
         columns: dict[str, Column] = {"t": lambda data: four_digits(data.duration.item())}
         answers: dict[str, Column] = {"agree": "agreement", **dict(zip(names, AGREEMENT, strict=True))}
         answers |= {"toppled": lambda data: str(np.isfinite(data.topple).sum().item()), "speed": _speeds}

@@ -2,7 +2,7 @@
 
 import ast
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass, make_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, make_dataclass, replace
 from inspect import getsource
 from itertools import pairwise
 from pathlib import Path
@@ -115,7 +115,8 @@ def option_fields(
 ) -> Iterator[Option]:
     """Yield one option for each field of a dataclass of settings.
 
-    A field of type `Conditions`, `Stride` or `Acceleration` becomes one option for each of its own fields.
+    A field of type `Conditions`, `Stride` or `Acceleration` becomes one option for each of its own fields. If the
+    dataclass has a field `axes`, the option of a condition that is a number takes several values.
 
     Args:
         settings: the dataclass. Its class variable `hidden`, if any, names fields and conditions without an option;
@@ -129,12 +130,14 @@ def option_fields(
     for member in fields(settings):
         kind, name = hints[member.name], NAMES.get(member.name, member.name)
         default = _default(member, defaults.get(name, MISSING))
-        if member.name in left_out or name in left_out:
+        if member.name in left_out or name in left_out or name == "axes":
             continue
         if several := {Conditions, Stride}.intersection((kind, *get_args(kind))):
             (kind,) = several
             for part in option_fields(kind, "walk" if kind is Stride else "conditions", left_out):
                 value = defaults.get(part.name, getattr(default, part.name, part.default))
+                if kind is Conditions and "axes" in hints and part.kind in (float, int):
+                    part, value = replace(part, kind=tuple[part.kind, ...]), (value,)
                 yield Option(part.name, part.kind, value, part.group)
         elif Acceleration in (kind, *get_args(kind)):
             yield Option("acceleration", float | None, defaults.get("acceleration"), "walk")
@@ -206,6 +209,9 @@ def build(settings: Any, given: SimpleNamespace, **own: Any) -> Any:
                 values["controllers"] = controllers(given)
             case "conditions":
                 values["conditions"] = conditions(given, _default(member))
+            case "axes":
+                several = _given(Conditions, given).items()
+                values["axes"] = {k: v for k, v in several if isinstance(v, tuple) and len(v) != 1}
             case "stride":
                 values["stride"] = stride(given)
             case "acceleration":
@@ -258,8 +264,9 @@ def controllers(given: SimpleNamespace) -> dict[str, Controller]:
 
 
 def conditions(given: SimpleNamespace, defaults: Conditions | None = None) -> Conditions:
-    """Return the conditions that the options set; a condition without an option has its value in `defaults`."""
-    return Conditions(**(defaults or Conditions()).values() | _given(Conditions, given))
+    """Return the conditions that the options set, of several values the first; the others are those of `defaults`."""
+    values = {k: v if isinstance(v, tuple) else (v,) for k, v in _given(Conditions, given).items()}
+    return Conditions(**(defaults or Conditions()).values() | {k: v[0] for k, v in values.items() if v})
 
 
 def stride(given: SimpleNamespace) -> Stride:

@@ -75,7 +75,7 @@ def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column
     rows = []
     for labels in product(*(result[axis].values.tolist() for axis in axes)):
         data = result.sel(dict(zip(axes, labels, strict=True)))
-        names = (f"{label:g}" if isinstance(label, float) else label.replace("_", " ") for label in labels)
+        names = (f"{label:g}" if isinstance(label, float) else str(label).replace("_", " ") for label in labels)
         rows.append((*names, *(_text(data, column) for column in columns.values())))
     return table((*axes, *columns), rows, len(axes))
 

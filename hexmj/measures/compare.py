@@ -2,20 +2,23 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 
-from hexmj.conditions import Conditions
+from hexmj.conditions import SCALARS, Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.wrappers import Begins
 from hexmj.legs import LEGS
 from hexmj.measures import tables
+from hexmj.measures.figures import UNITS
 from hexmj.measures.study import Study, outcome_table
 from hexmj.starts import draw_starts
 from hexmj.sweep import Cell, Execution, over_axes, run_study
 from hexmj.timing import Acceleration, Stride
+from hexmj.validate import choice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,9 +42,19 @@ REPORTED = ("clearance", "tilt", "speed", "slip", "tracking", "depth", "saturati
 """Outcomes that describe how well the body follows the plan."""
 
 
+class Point(NamedTuple):
+    """Settings in which the cells of a comparison differ."""
+
+    controller: str
+    conditions: Conditions
+    velocity: float
+    duration: float
+    """Observation time [time units]."""
+
+
 @dataclass(frozen=True)
 class Comparison(Study):
-    """Walks of several controllers from the same starts at every velocity; a cell for each controller and velocity."""
+    """Walks of several controllers from the same starts at every value of `axes` and every velocity."""
 
     controllers: Mapping[str, Controller]
     """Controllers by their names in the result."""
@@ -55,23 +68,39 @@ class Comparison(Study):
     """Where walks begin: at 'random' starts, or in the 'steady' state that the plan reaches from them in ten periods of
     a leg. The insect then begins with all feet on the tips of the plan, and losses and time count from there."""
     n_starts: int = field(default=60, kw_only=True)
-    """Number of random starts, the same for every controller and velocity."""
+    """Number of random starts, the same in every cell."""
+    axes: Mapping[str, Sequence[float]] = field(default_factory=dict, kw_only=True)
+    """Conditions that are axes of the result, each a number, and their values; the axes form a product."""
+
+    def __post_init__(self) -> None:
+        for name in self.axes:
+            choice("axes", name, SCALARS)
+        super().__post_init__()
+
+    @property
+    def points(self) -> list[Point]:
+        """The points of all cells in the order of the result's axes: controller, `axes`, velocity."""
+        every = product(self.controllers, self.varied, zip(*self.observed, strict=True))
+        return [Point(name, conditions, v, t) for name, conditions, (v, t) in every]
 
     def cells(self) -> list[Cell]:
-        """Return a cell for each controller and velocity, computed by `outcome_table`."""
+        """Return a cell for each of `points`, computed by `outcome_table`."""
         self.check_walks(self.velocities)
         cells = []
-        for name, controller in self.controllers.items():
-            for v, t in zip(*self.observed, strict=True):
-                walks = self.walks(v, t, self.conditions, controller)
-                cells.append(Cell(f"{name}-V-{v:g}", outcome_table, {"walks": walks}, walks.work))
+        for name, conditions, v, t in self.points:
+            walks = self.walks(v, t, conditions, self.controllers[name])
+            work = walks.work * conditions.substeps(self.stride)
+            cells.append(Cell(f"{name}-V-{v:g}", outcome_table, {"walks": walks}, work))
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the dataset that `compare` describes, from the datasets of all cells."""
         starts = draw_starts(self.n_starts, self.seed, self.stride)
-        table = over_axes({"controller": len(self.controllers), "velocity": len(self.velocities)}, data).assign_coords(
+        axes = {"controller": self.controllers, **self.axes, "velocity": self.velocities}
+        own: Any = {name: (name, list(v), {"units": UNITS.get(name, "1")}) for name, v in self.axes.items()}
+        table = over_axes({name: len(values) for name, values in axes.items()}, data).assign_coords(
             **tables.velocity_axis(*self.observed),
+            **own,
             controller=list(self.controllers),
             leg=list(LEGS),
             starts=(("start", "leg"), starts, {"units": "mm", "long_name": "tips at the start"}),
@@ -107,6 +136,7 @@ def compare(
     stride: Stride = Comparison.stride,
     acceleration: Acceleration | None = None,
     protocol: Begins = Comparison.protocol,
+    axes: Mapping[str, Sequence[float]] = {},
     folder: Path | None = None,
     **how: Unpack[Execution],
 ) -> "xr.Dataset":
@@ -122,14 +152,15 @@ def compare(
         stride: step range, lines of the tips and time step.
         acceleration: the accelerating procedure of Eq. 11; without it V_r is constant.
         protocol: 'random' or 'steady', see `Comparison.protocol`; 'steady' allows no acceleration.
+        axes: condition -> values, such as {"vp": [40.0, 80.0]}; every condition that is a number can become an axis.
         folder: directory in which finished cells are cached; None caches nothing.
         how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
 
     Returns:
-        Over (controller, velocity): the FLSS of `MEASURES` and `BESIDE` with their 95 % Wilson intervals (`kinematic`,
-        `kinematic_low`, ...), the number of starts in each case of `AGREEMENT`, and `agreement`, the fraction of
-        starts with a planned loss and a fall, or with neither. Over (controller, velocity, start): every field of
-        `physics.outcomes.Outcomes`.
+        Over (controller, *axes, velocity): the FLSS of `MEASURES` and `BESIDE` with their 95 % Wilson intervals
+        (`kinematic`, `kinematic_low`, ...), the number of starts in each case of `AGREEMENT`, and `agreement`, the
+        fraction of starts with a planned loss and a fall, or with neither. Over (controller, *axes, velocity, start):
+        every field of `physics.outcomes.Outcomes`.
 
     Raises:
         InputError: an argument is out of range.
@@ -138,7 +169,9 @@ def compare(
     named = controllers if isinstance(controllers, Mapping) else {getattr(controllers, "name", "?"): controllers}
     walks: Any = {"n_starts": n_starts, "seed": seed, "conditions": conditions, "stride": stride}
     walks |= {"velocities": np.atleast_1d(velocities).tolist(), "observation_time": observation_time}
-    return run_study(Comparison(named, acceleration=acceleration, protocol=protocol, **walks), folder, **how)
+    walks |= {"acceleration": acceleration, "protocol": protocol}
+    walks["axes"] = {name: np.atleast_1d(values).tolist() for name, values in axes.items()}
+    return run_study(Comparison(named, **walks), folder, **how)
 
 
 def physical_flss(
@@ -150,7 +183,7 @@ def physical_flss(
         controller: controller that plans the walks.
         velocities: one or several V_r, each 0 <= V < 1.
         n_starts: number of random starts.
-        options: other arguments of `compare`. `contact_gap` has no effect on falls without sensory feedback.
+        options: arguments of `compare`, except `axes`. `contact_gap` has no effect on falls without sensory feedback.
 
     Returns:
         The variables of `kinematic.flss` for falls, and the frequency `toppled` with its interval; over

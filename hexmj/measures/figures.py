@@ -3,11 +3,12 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hexmj.conditions import unusual
+from hexmj.conditions import Conditions, unusual
 from hexmj.io import settings
 from hexmj.measures.tables import happened
 from hexmj.plotting import BESIDE, LEGEND, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture, where
@@ -36,12 +37,23 @@ FEW = 3
 """Maximum number of panels in a row, and of controllers whose names a caption lists; of more, it lists those that
 deviate from the paper."""
 
+MOST = 12
+"""Maximum number of panels of a comparison."""
+
+
+class Panel(NamedTuple):
+    """A panel of a comparison: the title, and the data of one controller under one condition, over velocity first."""
+
+    title: str
+    data: "xr.Dataset"
+
 
 def caption(result: "xr.Dataset", least: int | None = None) -> str:
     """Return a line for a figure's title: controllers, starts, observation time, V_p, and other settings.
 
-    Fields of the stride and the conditions appear if they differ from their defaults. `least`, the minimum number of
-    starts behind any frequency of the figure, appears if it is below the number of all starts.
+    Fields of the stride and the conditions appear if they differ from their defaults. A condition that is a coordinate
+    of the result appears with the values of the coordinate instead of the recorded value. `least`, the minimum number
+    of starts behind any frequency of the figure, appears if it is below the number of all starts.
     """
     recorded = settings(result)
     words = [_controllers(recorded.get("controllers", {}), result)]
@@ -60,9 +72,10 @@ def caption(result: "xr.Dataset", least: int | None = None) -> str:
     changed = {name: value for name, value in stride.items() if value != default.get(name, value)}
     words.append("other lines of the tips" if changed.pop("geometry", None) else "")
     words.append(", ".join(_term(name, value) for name, value in changed.items()))
-    if given := recorded.get("conditions") or {}:
-        shown = {"vp", *unusual(given)}
-        words.append(", ".join(_term(name, value) for name, value in given.items() if name in shown))
+    given = recorded.get("conditions") or {}
+    shown = {name: given[name] for name in given if name in {"vp", *unusual(given)}}
+    shown |= {name: axis.values for name, axis in result.coords.items() if axis.dims in ((), (name,))}
+    words.append(", ".join(_term(name, shown[name]) for name in Conditions().settings() if name in shown))
     if least not in (None, result.attrs.get("starts")):
         words.append(f"frequencies of at least {least} of them")
     return "; ".join(filter(None, words))
@@ -92,33 +105,53 @@ def network_rules(controller: Any) -> str:
 
 
 def comparison_figure(result: "xr.Dataset") -> "Figure":
-    """Draw a result of `compare`: frequencies against velocity with 95 % intervals, a panel for each controller."""
-    result = result.sortby("velocity").transpose("controller", "velocity", "start", ...)
-    names, shown = result.controller.values, {name: style for name, style in MEASURE_STYLES.items() if name in result}
-    columns = min(FEW, len(names))
-    rows = -(-len(names) // columns)
+    """Draw a result of `compare`: frequencies against velocity with 95 % intervals, in at most `MOST` panels.
+
+    There is a panel for each controller and combination of other axes; with these, each controller begins a row.
+    """
+    result, names = result.sortby("velocity"), result.controller.values
+    panels, shown = _panels(result), {name: style for name, style in MEASURE_STYLES.items() if name in result}
+    together = len(panels) // len(names) if len(panels) > len(names) else len(panels)  # panels that fill rows together
+    deep = -(-together // FEW)
+    columns, drawn = -(-together // deep), panels[:MOST]
+    rows = deep * -(-len(drawn) // together)
     figure = picture(max(7.0, 3.4 * columns), 1.6 + 2.9 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False, sharey=True)
-    shifts = np.linspace(-0.5, 0.5, len(shown)) * BESIDE
-    for axes, name in zip(panels.ravel(), names, strict=False):
-        data = result.sel(controller=name)
+    shifts, axes = np.linspace(-0.5, 0.5, len(shown)) * BESIDE, None
+    for number, (title, data) in enumerate(drawn):
+        place = 1 + number // together * deep * columns + number % together
+        axes = figure.add_subplot(rows, columns, place, sharey=axes)
         for (measure, style), shift in zip(shown.items(), shifts, strict=True):
             frequency_curve(axes, data.velocity + shift, data, measure, **style)
-        axes.set_title(in_figure(name), fontsize=11)
+        axes.set_title(title, fontsize=11)
         flss_axes(axes, result.velocity.values)
         axes.label_outer(remove_inner_ticks=False)
-    for axes in panels.ravel()[len(names) :]:
-        axes.set_visible(False)
-    handles, _ = panels[0, 0].get_legend_handles_labels()
+    handles, _ = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=2)
-    lost, fell = (happened(result[outcome]).values for outcome in ("planned_loss", "fall"))
+    lost, fell = (np.stack([happened(data[outcome]) for _, data in panels]) for outcome in ("planned_loss", "fall"))
     more = paired_difference(lost, fell)[1] > 0.0  # beyond the 95 % interval
-    found = [f"{in_figure(name)} {where(result.velocity.values, row)}" for name, row in zip(names, more, strict=True)]
-    found = found if len(names) <= FEW else [f"in {more.sum()} of {more.size} cases"]
+    found = [f"{panel.title} {where(result.velocity.values, row)}" for panel, row in zip(panels, more, strict=True)]
+    found = found if len(panels) <= FEW else [f"in {more.sum()} of {more.size} cases"]
     exceeds = "exceeds the frequency of falls"
     finding = f"clearly {exceeds}: {'; '.join(found)}" if more.any() else f"at no velocity clearly {exceeds}"
-    head(figure, f"the kinematic FLSS {finding}", caption(result), "bars: 95 % intervals")
+    part = f"the first {MOST} of {len(panels)} panels" if len(panels) > MOST else ""
+    head(figure, f"the kinematic FLSS {finding}", caption(result), "bars: 95 % intervals", part)
     return figure
+
+
+def axes_of(result: "xr.Dataset") -> list[str]:
+    """Return the axes of a comparison except controller, velocity and start, such as ["vp"]."""
+    return [str(axis) for axis in result.physical.dims if axis not in ("controller", "velocity")]
+
+
+def _panels(result: "xr.Dataset") -> list[Panel]:
+    """Return the panels of a comparison, all of the first controller first."""
+    axes, panels = sorted(axes_of(result)), []
+    for name, *point in product(result.controller.values, *(result[axis].values.tolist() for axis in axes)):
+        terms = [_term(axis, value) for axis, value in zip(axes, point, strict=True)]
+        title = ", ".join([in_figure(name)] * (result.sizes["controller"] > 1 or not terms) + terms)
+        data = result.sel(controller=name, **dict(zip(axes, point, strict=True)))
+        panels.append(Panel(title, data.transpose("velocity", "start", ...)))
+    return panels
 
 
 def flss_figure(result: "xr.Dataset") -> "Figure":
@@ -146,8 +179,8 @@ def _controllers(controllers: Mapping[str, Any], result: "xr.Dataset") -> str:
     return ", ".join(in_figure(name) + f" ({words})" * bool(words) for name, words in rules.items() if words or few)
 
 
-def _term(name: str, value: Any) -> str:
-    """Return the text 'name = value unit' of a setting, with no-break spaces."""
-    number = f"{value:g}" if isinstance(value, float | int) else str(value)
-    text = f"{SYMBOLS.get(name, name.replace('_', ' '))} = {number} {UNITS.get(name, '')}"
+def _term(name: str, values: Any) -> str:
+    """Return the text 'name = value unit' of a setting with one or several values, with no-break spaces."""
+    numbers = [f"{v:g}" if isinstance(v, float | int) else str(v) for v in np.unique(values).tolist()]
+    text = f"{SYMBOLS.get(name, name.replace('_', ' '))} = {', '.join(numbers)} {UNITS.get(name, '')}"
     return text.strip().replace(" ", "\N{NO-BREAK SPACE}")

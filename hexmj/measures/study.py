@@ -1,8 +1,9 @@
 """Base class of the studies, and the cell that most have: physical walks of one controller at one velocity."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 import numpy as np
@@ -61,19 +62,28 @@ class Study:
         for controller in self.plans().values():
             settings_of(controller)  # raises InputError now rather than after the computation
         given, default = self.conditions.values(), type(self).conditions.values()
-        for name in self.set_by_study:
-            if given[name] != default[name]:
+        for name in (*self.hidden, *self.varies):
+            if given[name] not in (default[name], *getattr(self, "axes", {}).get(name, ())):
                 raise InputError(f"{name} = {given[name]}; expected {default[name]}, since the study sets it itself")
-        if "ground" not in self.set_by_study:
-            check_ground(self.conditions)
         choice("protocol", self.protocol, get_args(Begins))
         if (self.procedure or 0 in self.observed[0]) and self.protocol == "steady":
             raise InputError("protocol = steady has no walks that accelerate or stand still; use the protocol random")
+        for name, values in self.varies.items():
+            distinct(name, values)
+        for conditions in self.varied:
+            if "ground" not in self.hidden:
+                check_ground(conditions)
 
     @property
-    def set_by_study(self) -> tuple[str, ...]:
-        """All conditions that the study sets itself; a subclass may choose them by its fields."""
-        return self.hidden
+    def varies(self) -> Mapping[str, Sequence[float]]:
+        """Conditions that the study varies -> their values."""
+        return getattr(self, "axes", {})
+
+    @property
+    def varied(self) -> list[Conditions]:
+        """The conditions of walks at every combination of the values in `varies`; the last condition varies fastest."""
+        rows = product(*self.varies.values())
+        return [replace(self.conditions, **dict(zip(self.varies, row, strict=True))) for row in rows]
 
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -124,9 +134,11 @@ class Study:
         conditions = {k: v for k, v in self.conditions.settings().items() if k not in self.set_by_study}
         made = {"study": study, "protocol": self.protocol} | shared | own | {"conditions": conditions}
         return table.assign_attrs(attributes(made))
+        conditions = {k: v for k, v in self.conditions.settings().items() if k not in (*self.hidden, *self.varies)}
+        return table.assign_attrs(attributes({"study": study} | shared | own | {"conditions": conditions}))
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=8)
 def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None) -> "Settled":
     """Return the random starts of a seed after they have come to rest; cached, since all controllers share them."""
     from hexmj.physics.settle import settle

@@ -1,7 +1,7 @@
 """Dynamic stability maps: physical FLSS over velocity and one condition, from the same starts in every cell."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from hexmj.starts import draw_starts
 from hexmj.studies.mechanisms import MECHANISMS, SAVED, fall_direction, mechanisms, static_plan
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration
-from hexmj.validate import choice, distinct
+from hexmj.validate import choice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,32 +96,20 @@ class StabilityMap(Study):
     def __post_init__(self) -> None:
         choice("over", self.over, CONDITIONS)
         super().__post_init__()
-        distinct("values", self.chosen)
-        _ = self.varied
         start, v = draw_starts(1, self.seed, self.stride), self.observed[0][:1]
         if isinstance(begin(self.controller, start, v, self.stride, self.acceleration, threads=1), FeedbackPlan):
             raise InputError(f"controller = {self.controller.name}; expected a controller without sensory feedback")
 
     @property
-    def set_by_study(self) -> tuple[str, ...]:
-        """The name of the varied condition, in a tuple."""
-        return (self.over,)
-
-    @property
-    def chosen(self) -> list[float]:
-        """The values of the varied condition: `values`, or the default values."""
-        return [float(value) for value in self.values or CONDITIONS[self.over].values]
-
-    @property
-    def varied(self) -> list[Conditions]:
-        """The conditions of walks at each value of the varied condition."""
-        return [replace(self.conditions, **{self.over: value}) for value in self.chosen]
+    def varies(self) -> Mapping[str, Sequence[float]]:
+        """The varied condition -> `values`, or the default values."""
+        return {self.over: [float(value) for value in self.values or CONDITIONS[self.over].values]}
 
     def cells(self) -> list[Cell]:
         """Return a cell for each value and velocity, computed by `fates`."""
         self.check_walks(self.velocities, *self.varied)
         cells = []
-        for value, conditions in zip(self.chosen, self.varied, strict=True):
+        for value, conditions in zip(self.varies[self.over], self.varied, strict=True):
             for v, time in zip(*self.observed, strict=True):
                 walks = self.walks(v, time, conditions)
                 own, work = {"walks": walks, "over": self.over}, walks.work * conditions.substeps(self.stride)
@@ -142,19 +130,20 @@ class StabilityMap(Study):
         Raises:
             InputError: no start stands and reaches nine of ten foot targets in every cell.
         """
-        sizes, axis = {"value": len(self.chosen), "velocity": len(self.velocities)}, CONDITIONS[self.over]
+        values, axis = self.varies[self.over], CONDITIONS[self.over]
+        sizes = {"value": len(values), "velocity": len(self.velocities)}
         table = over_axes(sizes, data, join="inner", combine_attrs="override")
         if not table.sizes["start"]:
-            at = f"{self.over} = {self.chosen}"
+            at = f"{self.over} = {values}"
             raise InputError(f"{at}: no start stands and reaches nine of ten foot targets at every value and velocity")
         left, columns = [set(cell.start.values.tolist()) for cell in data], sizes["velocity"]
         stand = [len(set.intersection(*left[i : i + columns])) for i in range(0, len(left), columns)]
         default = Conditions().values()[self.over]
-        reference = default if default in self.chosen else self.chosen[0]
+        reference = default if default in values else values[0]
         numbers = np.stack([froude(conditions, self.observed[0]) for conditions in self.varied])
         table = table.assign_coords(
             **velocity_axis(*self.observed),
-            value=("value", self.chosen, {"units": axis.unit, "long_name": axis.name}),
+            value=("value", values, {"units": axis.unit, "long_name": axis.name}),
             mechanism_name=("mechanism_name", list(MECHANISMS)),
         ).assign(
             stand=("value", stand, {"units": "1", "long_name": "starts that stand and reach nine of ten tips"}),

@@ -8,7 +8,7 @@ stance may hover while other feet carry the weight. The hovering foot is still a
 touches the ground as soon as the trunk sinks.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -26,7 +26,6 @@ from hexmj.progress import Progress
 from hexmj.stability import loss_time, stability_margin, walk_margin
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration
-from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,16 +96,10 @@ class StaticLimit(Study):
 
     hidden: ClassVar[tuple[str, ...]] = ("vp", "leg_mass")
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        distinct("vps", self.vps)
-        distinct("leg_masses", self.leg_masses)
-        _ = self.varied
-
     @property
-    def varied(self) -> list[Conditions]:
-        """The conditions of walks with each mass of the legs at each V_p."""
-        return [replace(self.conditions, leg_mass=mass, vp=vp) for mass, vp in product(self.leg_masses, self.vps)]
+    def varies(self) -> Mapping[str, Sequence[float]]:
+        """The masses of the legs and the V_p."""
+        return {"leg_mass": self.leg_masses, "vp": self.vps}
 
     def cells(self) -> list[Cell]:
         """Return a cell for each mass of the legs and V_p, computed by `distance_table`."""
