@@ -177,7 +177,8 @@ class CompareOptions:
 
 class Compare(StudyCommand):
     """Compare the kinematic, grounded, carried and physical FLSS of controllers on the same starts. Write a table, a
-    figure, NetCDF, a manifest and a gait video. Repeat the command to resume a stopped run."""
+    figure, NetCDF, a manifest and a gait video. Several values of a condition, as in `--vp 40 80`, are an axis of the
+    result. Repeat the command to resume a stopped run."""
 
     study = "measures.compare:Comparison"
     own = (CompareOptions,)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from itertools import product
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,18 @@ import numpy as np
 from hexmj.conditions import Conditions, unusual
 from hexmj.io import settings
 from hexmj.measures.tables import happened
-from hexmj.plotting import BESIDE, LEGEND, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture, where
+from hexmj.plotting import (
+    BESIDE,
+    LEGEND,
+    MEASURE_STYLES,
+    VELOCITY,
+    flss_axes,
+    frequency_curve,
+    head,
+    in_figure,
+    picture,
+    where,
+)
 from hexmj.stats import paired_difference
 from hexmj.timing import Stride
 
@@ -122,9 +134,12 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
         axes = figure.add_subplot(rows, columns, place, sharey=axes)
         for (measure, style), shift in zip(shown.items(), shifts, strict=True):
             frequency_curve(axes, data.velocity + shift, data, measure, **style)
-        axes.set_title(title, fontsize=11)
+        axes.set_title("\n".join(wrap(title, 36, break_long_words=False)), fontsize=11)
         flss_axes(axes, result.velocity.values)
         axes.label_outer(remove_inner_ticks=False)
+        if number + columns >= len(drawn):  # there is no panel below
+            axes.tick_params(labelbottom=True)
+            axes.set_xlabel(VELOCITY)
     handles, _ = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=2)
     lost, fell = (np.stack([happened(data[outcome]) for _, data in panels]) for outcome in ("planned_loss", "fall"))
