@@ -4,7 +4,7 @@
 # make bench      every speed beside a peer, under ten minutes; ARGS="..." goes to pytest
 # make lint       style and types
 # make docs       the documentation, in results/site; `python3 -m http.server -d results/site` serves it
-# make results    all results and the pages in docs/results; hours
+# make results    all results and the tables and figures of the pages; hours
 # make gallery    the documentation's films of walks, in docs/images
 # PYTHON=...      the Python, 3.11 or newer, for .venv
 
@@ -50,6 +50,11 @@ results: bench
 	.venv/bin/hexmj league --processes 2 --no-video
 	.venv/bin/hexmj league --processes 2 --no-video --protocol steady --velocity 0.5 --trial-starts 1 \
 	    --out results/league/steady
+	for varied in "vp 40 80 160" "centre-of-mass -2 0 2" "standing-height 8 10 12" "landing-time 10 20 40" \
+	    "step-height 4 12" "friction 0.5 1"; do \
+	    .venv/bin/hexmj compare --controller ldvs --velocity 0.5 --starts 400 --no-video --$$varied \
+	        --out results/sensitivity/$${varied%% *} || exit 1; \
+	done
 	.venv/bin/python docs/results.py
 
 gallery: .venv/project system

@@ -1,4 +1,4 @@
-"""Write the tables and figures of the pages in docs/results: `python docs/results.py [FOLDER]`, by default `results`.
+"""Write the tables and figures of pages with results: `python docs/results.py [FOLDER]`, by default `results`.
 
 `make results` computes what it reads. The table of a page stands between two comments; the text around it is written by
 hand and quotes the table. A page without results in the folder stays as it is.
@@ -19,12 +19,15 @@ from PIL import Image
 
 import hexmj
 from hexmj import io
+from hexmj.measures.figures import UNITS
+from hexmj.measures.tables import happened
 from hexmj.paper.claims import claims
 from hexmj.plotting import as_shipped
+from hexmj.stats import paired_difference
 from hexmj.studies.biology import ANIMALS, table_rows, walked_in_words
 from hexmj.studies.standings import by_rank, frequency, place
 
-PAGES = Path(__file__).parent / "results"
+PAGES = Path(__file__).parent
 IMAGES = Path(__file__).parent / "images"
 BEGIN, END = "<!-- table -->\n", "<!-- end of the table -->"
 SEED, N_STARTS = 1998, 7000
@@ -33,9 +36,6 @@ SEED, N_STARTS = 1998, 7000
 NETWORK = re.compile(r", (HWS|LDVS)$")
 VARIED = re.compile(r", (front|middle|hind)\b| at (\d+ mm/s)")
 """Part of a quantity's name in which neighbouring rows of `hexmj biology` differ; such rows become one."""
-
-STEP = "step"
-"""Trial of the league that has a column of its own."""
 
 
 def table(head: str, rows: Sequence[Sequence[str]]) -> str:
@@ -126,7 +126,7 @@ def league(folder: Path) -> list[str]:
             for measure in ("kinematic", "physical")
         ]
         at_half = [frequency(middle, measure) for measure in ("kinematic", "physical")]
-        others = [f"{middle.stable.item():.2f}", frequency(own.sel(trial=STEP), "fell"), f"{tried.cost.item():.2f}"]
+        others = [f"{middle.stable.item():.2f}", frequency(own.sel(trial="step"), "fell"), f"{tried.cost.item():.2f}"]
         rows.append([name, *(text.replace("nan", "-") for text in (*means, *at_half, *others))])
     head = "controller|FLSS, mean (rank)|falls, mean (rank)|FLSS, V = 0.5|falls, V = 0.5"
     first = table(f"{head}|stable gaits, V = 0.5|falls, step|cost of transport", rows)
@@ -161,6 +161,21 @@ def biology(folder: Path) -> list[str]:
     return [table("quantity|hexmj (95 %)|insects|verdict|source", rows) + note]
 
 
+def sensitivity(folder: Path) -> list[str]:
+    """Return the falls with one condition changed at a time, and their differences to the defaults."""
+    rows = [["defaults", "", "", ""]]
+    for path in sorted(folder.parent.glob("*/comparison.nc")):
+        option, result = path.parent.name, io.load(path).isel(controller=0, velocity=0)
+        default = getattr(hexmj.Conditions(), name := option.replace("-", "_"))
+        rows[0][2] = frequency(result.sel({name: default}), "physical")
+        fell, unit = happened(result.fall), f"{default:g} {UNITS.get(name, '')}".strip()
+        for value in result[name].values[result[name] != default]:
+            change = paired_difference(fell.sel({name: value}).values, fell.sel({name: default}).values)
+            text = "{:+.2f} ({:+.2f} to {:+.2f})".format(*change).replace("0.", ".")
+            rows.append([f"`--{option} {value:g}`", unit, frequency(result.sel({name: value}), "physical"), text])
+    return [table("option|default|falls|difference", rows)]
+
+
 def speed(folder: Path) -> list[str]:
     """Return the ratios of `make bench`, without the speeds of the machine."""
     lines = (folder / "table.md").read_text(encoding="utf-8").splitlines()
@@ -175,9 +190,9 @@ def main() -> None:
     """Write every page whose results are in the folder."""
     results = Path(sys.argv[1] if len(sys.argv) > 1 else "results")
     files = {paper: "reproduce/claims.json", league: "league/league.nc"}
-    files |= {biology: "biology/biology.nc", speed: "bench/table.md"}
+    files |= {biology: "biology/biology.nc", speed: "bench/table.md", sensitivity: "sensitivity/vp/comparison.nc"}
     for write, name in files.items():
-        page = PAGES / f"{write.__name__}.md"
+        page = PAGES / ("concepts/physics.md" if write is sensitivity else f"results/{write.__name__}.md")
         if not (results / name).exists():
             print(f"{page.name} stays: {results / name} does not exist")
             continue

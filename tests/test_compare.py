@@ -84,7 +84,8 @@ def test_each_point_of_the_axes_equals_a_run_of_its_own(run, tmp_path):
     axes = {"vp": [320.0, 160.0], "load": [0.0, 0.5]}
     every = compare(BOTH, [0.5, 0.6], **FEW, axes=axes)
     assert every.fall.dims == ("controller", "vp", "load", "velocity", "start")
-    for point in ({"vp": 160.0, "load": 0.5}, {"vp": 320.0, "load": 0.0}):
+    points: list[Any] = [{"vp": 160.0, "load": 0.5}, {"vp": 320.0, "load": 0.0}]
+    for point in points:
         alone = compare(BOTH, [0.5, 0.6], **FEW, conditions=Conditions(**point))
         part = every.sel(point).drop_vars([*point])
         assert part.assign_attrs(alone.attrs).identical(alone)

@@ -150,7 +150,7 @@ def test_a_load_without_trials_refuses_no_league() -> None:
         ("over", StabilityMap, {"over": "wind"}),
         ("friction", StabilityMap, {"over": "friction", "values": [-1.0]}),
         ("sensory feedback", StabilityMap, {"controller": hexmj.SensoryFeedback(hexmj.LDVS)}),
-        ("leg_masses", StaticLimit, {"leg_masses": ()}),
+        ("leg_mass", StaticLimit, {"leg_masses": ()}),
         ("vp", StaticLimit, {"conditions": hexmj.Conditions(vp=20.0)}),
         ("disturbances", DisturbedWalks, {"disturbances": ["halt", "halt"]}),
         ("disturbances", DisturbedWalks, {"disturbances": ["push"], "kinematic": True}),

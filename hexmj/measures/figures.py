@@ -5,25 +5,14 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from itertools import product
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hexmj.conditions import Conditions, unusual
 from hexmj.io import settings
 from hexmj.measures.tables import happened
-from hexmj.plotting import (
-    BESIDE,
-    LEGEND,
-    MEASURE_STYLES,
-    VELOCITY,
-    flss_axes,
-    frequency_curve,
-    head,
-    in_figure,
-    picture,
-    where,
-)
+from hexmj.plotting import BESIDE, LEGEND, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture, where
 from hexmj.stats import paired_difference
 from hexmj.timing import Stride
 
@@ -51,13 +40,6 @@ deviate from the paper."""
 
 MOST = 12
 """Maximum number of panels of a comparison."""
-
-
-class Panel(NamedTuple):
-    """A panel of a comparison: the title, and the data of one controller under one condition, over velocity first."""
-
-    title: str
-    data: "xr.Dataset"
 
 
 def caption(result: "xr.Dataset", least: int | None = None) -> str:
@@ -125,7 +107,7 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
     panels, shown = _panels(result), {name: style for name, style in MEASURE_STYLES.items() if name in result}
     together = len(panels) // len(names) if len(panels) > len(names) else len(panels)  # panels that fill rows together
     deep = -(-together // FEW)
-    columns, drawn = -(-together // deep), panels[:MOST]
+    columns, drawn = -(-together // deep), list(panels.items())[:MOST]
     rows = deep * -(-len(drawn) // together)
     figure = picture(max(7.0, 3.4 * columns), 1.6 + 2.9 * rows)
     shifts, axes = np.linspace(-0.5, 0.5, len(shown)) * BESIDE, None
@@ -136,15 +118,16 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
             frequency_curve(axes, data.velocity + shift, data, measure, **style)
         axes.set_title("\n".join(wrap(title, 36, break_long_words=False)), fontsize=11)
         flss_axes(axes, result.velocity.values)
+        label = axes.get_xlabel()
         axes.label_outer(remove_inner_ticks=False)
         if number + columns >= len(drawn):  # there is no panel below
             axes.tick_params(labelbottom=True)
-            axes.set_xlabel(VELOCITY)
+            axes.set_xlabel(label)
     handles, _ = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=2)
-    lost, fell = (np.stack([happened(data[outcome]) for _, data in panels]) for outcome in ("planned_loss", "fall"))
-    more = paired_difference(lost, fell)[1] > 0.0  # beyond the 95 % interval
-    found = [f"{panel.title} {where(result.velocity.values, row)}" for panel, row in zip(panels, more, strict=True)]
+    pairs = [(happened(data.planned_loss).values, happened(data.fall).values) for data in panels.values()]
+    more = np.array([paired_difference(*pair)[1] > 0.0 for pair in pairs])  # beyond the 95 % interval
+    found = [f"{title} {where(result.velocity.values, row)}" for title, row in zip(panels, more, strict=True)]
     found = found if len(panels) <= FEW else [f"in {more.sum()} of {more.size} cases"]
     exceeds = "exceeds the frequency of falls"
     finding = f"clearly {exceeds}: {'; '.join(found)}" if more.any() else f"at no velocity clearly {exceeds}"
@@ -158,14 +141,14 @@ def axes_of(result: "xr.Dataset") -> list[str]:
     return [str(axis) for axis in result.physical.dims if axis not in ("controller", "velocity")]
 
 
-def _panels(result: "xr.Dataset") -> list[Panel]:
-    """Return the panels of a comparison, all of the first controller first."""
-    axes, panels = sorted(axes_of(result)), []
+def _panels(result: "xr.Dataset") -> "dict[str, xr.Dataset]":
+    """Return title -> data, (velocity, start), of the panels of a comparison, those of the first controller first."""
+    axes, panels = sorted(axes_of(result)), {}
     for name, *point in product(result.controller.values, *(result[axis].values.tolist() for axis in axes)):
         terms = [_term(axis, value) for axis, value in zip(axes, point, strict=True)]
         title = ", ".join([in_figure(name)] * (result.sizes["controller"] > 1 or not terms) + terms)
         data = result.sel(controller=name, **dict(zip(axes, point, strict=True)))
-        panels.append(Panel(title, data.transpose("velocity", "start", ...)))
+        panels[title] = data.transpose("velocity", "start", ...)
     return panels
 
 
