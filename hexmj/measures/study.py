@@ -131,7 +131,7 @@ class Study:
         """
         time = getattr(self, "observation_time", "walk")
         shared = settings(self.plans(), time, self.n_starts, self.seed, self.stride, self.procedure)
-        conditions = {k: v for k, v in self.conditions.settings().items() if k not in self.set_by_study}
+        conditions = {k: v for k, v in self.conditions.settings().items() if k not in (*self.hidden, *self.varies)}
         made = {"study": study, "protocol": self.protocol} | shared | own | {"conditions": conditions}
         return table.assign_attrs(attributes(made))
         conditions = {k: v for k, v in self.conditions.settings().items() if k not in (*self.hidden, *self.varies)}
