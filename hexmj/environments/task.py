@@ -13,10 +13,10 @@ Observations are float64 and clipped to their bounds (`observation_bounds`):
 - velocity: velocity of the root, (3,) [mm/s]: along its heading, to the left of it, and up
 - angular_velocity: angular velocity of the root, in the root frame, (3,) [rad/s]
 - clearance: height of the trunk's lowest point, (1,) [mm]
-- tips: measured tips in the root frame, (leg, axis) [mm]
+- tips: tips of the simulated legs in the root frame, (leg, axis) [mm]
 - contact: (leg,) 1 for feet that the ground carried at the beginning of the last physics step, or less than
   `Conditions.contact_gap` before it
-- margin: measured stability margin, (1,) [mm], of the feet in contact and the insect's own centre of mass; if no foot
+- margin: stability margin, (1,) [mm], of the feet in contact and the insect's own centre of mass; if no foot
   is in contact, `Lengths.no_foot_margin`, which is farther than any foot reaches
 - command: commanded velocity, (1,) [mm/s]
 - planned_stance: (leg,) 1 for legs that the plan puts in stance

@@ -22,7 +22,7 @@ from hexmj.walks import PlannedWalk, Walk, copied, extent, footfall_html, joined
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhysicalWalk:
-    """Every step of physical walks. After a fall all measured numbers are NaN, and no foot stands."""
+    """Every step of physical walks. After a fall all numbers of the simulation are NaN, and no foot stands."""
 
     planned: PlannedWalk
     """The kinematic plan; for a feedback plan, the same plan without sensory feedback."""

@@ -1,4 +1,4 @@
-"""Outcomes of physical walks, added up chunk by chunk: measured walks, losses of stability, falls and effort."""
+"""Outcomes of physical walks, added up chunk by chunk: simulated walks, losses of stability, falls and effort."""
 
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -241,7 +241,7 @@ class StepEnds(NamedTuple):
 
 
 def grounded(measured: Walk, height: np.ndarray, conditions: Conditions) -> Walk:
-    """Return a measured walk in which all feet at the ground stand: those below `GROUNDED` standing heights.
+    """Return a simulated walk in which all feet at the ground stand: those below `GROUNDED` standing heights.
 
     Args:
         measured: walk of the simulated bodies.

@@ -4,7 +4,7 @@ The time constant T = sqrt(h / g) is that of an inverted pendulum of the standin
 the plan's margin around the body's own centre of mass is no longer positive. It ends when all of these are true:
 
 - the plan is stable again;
-- the centre of mass is above the polygon of the measured feet;
+- the centre of mass is above the polygon of the feet that carry load;
 - the trunk has stayed below a tilt of `TIPPED` for a time T.
 
 A fall begins when the trunk last had stayed below a tilt of `TIPPED` for a time T. Two things decide its mechanism: how
@@ -30,8 +30,8 @@ TIPPED = 0.05
 
 MECHANISMS = {
     "never_lost": "no planned loss and no fall",
-    "still_standing": "saved: the centre of mass never left the polygon of the measured feet",
-    "too_short": "saved: the centre of mass was outside the polygon of the measured feet, but the trunk never tipped",
+    "still_standing": "saved: the centre of mass never left the polygon of the feet that carry load",
+    "too_short": "saved: the centre of mass left the polygon of the feet that carry load, but the trunk never tipped",
     "landed_in_time": "saved: the trunk had tipped, and the feet that the plan put down held it",
     "caught": "saved: the trunk came down on a foot that the plan held in the air",
     "tipped_behind": "fell as the plan lost stability, leaning back",
