@@ -92,11 +92,11 @@ browser:
 	touch $@
 
 .venv/project: .venv/begun pyproject.toml constraints.txt
-	$(PROJECT) ".[film]"
+	$(PROJECT) .
 	touch $@
 
 .venv/dev: .venv/begun pyproject.toml constraints.txt
-	$(PROJECT) ".[film,search,gym,dask,view,docs]" --group dev
+	$(PROJECT) ".[search,gym,dask,view,docs]" --group dev
 	touch .venv/project $@
 
 # stable-baselines3 and torch, for tests of learning, which are skipped without them.

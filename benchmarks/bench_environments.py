@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from hexmj import LDVS, Stride, draw_starts
-from hexmj.environments import dm
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.task import Task
 from hexmj.environments.vector import StickInsects
@@ -23,6 +22,9 @@ MANY, FEW_STEPS = 1000, 100
 @pytest.mark.parametrize("who", ["hexmj", "bare mj_step, the same controls", "the dm_env interface"])
 def test_one(measure, who, actions, dt):
     """One insect that walks, or stands where its joints do not move; the bare loop only steps."""
+    pytest.importorskip("dm_control", reason="dm_control needs Python below 3.13")
+    from hexmj.environments import dm
+
     task = Task(VELOCITY, actions, stride=Stride(dt=dt), duration=1e5)
     walking, other = StickInsect(**vars(task)), dm.load(**vars(task))
     controls, data = [], mujoco.MjData(walking.model)

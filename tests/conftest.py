@@ -3,7 +3,9 @@
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from tempfile import gettempdir
+from types import ModuleType
 
 import pytest
 
@@ -13,6 +15,18 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # in a background job, wh
 from hexmj.rendering import use_egl_without_display
 
 use_egl_without_display()  # before a test imports MuJoCo
+
+
+collect_ignore = [] if find_spec("dm_control") else ["test_environment.py"]
+
+
+@pytest.fixture
+def dm() -> ModuleType:
+    """The dm_env interface; tests of it are skipped without dm_control."""
+    pytest.importorskip("dm_control", reason="dm_control needs Python below 3.13")
+    from hexmj.environments import dm
+
+    return dm
 
 
 @pytest.fixture(autouse=True)

@@ -4,16 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dm_control.rl import control
-from dm_env import TimeStep
 
 TIPS: dict[str, Any] = {"actions": "tips"}
 ZEROS = np.zeros(18)
 KINDS = pytest.mark.parametrize("actions", ["joints", "tips"])
 
 
-def episode(walking: control.Environment, action: np.ndarray) -> list[TimeStep]:
-    """Return an episode with a constant action."""
+def episode(walking: Any, action: np.ndarray) -> list[Any]:
+    """Return an episode of the dm_env interface with a constant action."""
     steps = [walking.reset()]
     while not steps[-1].last():
         steps.append(walking.step(action))

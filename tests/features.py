@@ -383,7 +383,13 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     # This one becomes a script.
 }
 
-OPTIONAL = {"distributed": "flss scheduler", "stable_baselines3": "python stable-baselines3", "viser": "view live"}
+OPTIONAL = {
+    "flss scheduler": "distributed",
+    "view live": "viser",
+    "python stable-baselines3": "stable_baselines3",
+    "python dm_env": "dm_control",
+    "python examples": "dm_control",
+}
 
 
 def normal(value: Any, key: str = "") -> Any:
@@ -445,7 +451,7 @@ def main(words: list[str]) -> int:
     for old, new in RENAMED.items():
         recorded = recorded.replace(f'"{old}"', f'"{new}"')
     reference = json.loads(recorded)
-    left_out = [feature for package, feature in OPTIONAL.items() if not find_spec(package)]
+    left_out = [feature for feature, package in OPTIONAL.items() if not find_spec(package)]
     chosen = [name for name in FEATURES if name.startswith(names or "")]
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job of a shell ignores it
     with TemporaryDirectory(prefix="hexmj-features-", ignore_cleanup_errors=True) as folder, chdir(folder):

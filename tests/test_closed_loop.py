@@ -9,7 +9,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 import hexmj
 from hexmj.controllers.feedback import SensedPlan
 from hexmj.controllers.protocol import Sensed
-from hexmj.environments import dm
 from hexmj.legs import MIRROR
 from hexmj.measures.physical import physical_outcomes, physical_walk, physical_walk_of_plan
 from hexmj.physics.outcomes import Outcomes
@@ -153,7 +152,7 @@ def test_a_standing_leg_is_lifted_where_its_tip_is_read(settled):
         assert_allclose(after.x[0, 0, 2], (starts[0, 2] if stands else behind) - 0.05)
 
 
-def test_the_environment_tells_it_before_every_step(monkeypatch):
+def test_the_environment_tells_it_before_every_step(monkeypatch, dm):
     told = []
     usual = SensedPlan.sense
     monkeypatch.setattr(SensedPlan, "sense", lambda plan, sensed: (told.append(sensed), usual(plan, sensed)))

@@ -91,8 +91,10 @@ def test_commands_have_options_that_exist(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page) and not page.endswith(".ipynb")])
-def test_python_of_a_page(page, folder):
+def test_python_of_a_page(page, folder, request):
     """All blocks of a page are one program."""
+    if "import dm" in PAGES[page]:
+        request.getfixturevalue("dm")
     names = {"__name__": page}
     for block in blocks(page):
         exec(compile(block, page, "exec"), names)
@@ -100,7 +102,9 @@ def test_python_of_a_page(page, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", [name for name in EXAMPLES if name not in LONG_EXAMPLES])
-def test_example(example, folder, monkeypatch):
+def test_example(example, folder, monkeypatch, request):
+    if "import dm" in (ROOT / "examples" / f"{example}.py").read_text(encoding="utf-8"):
+        request.getfixturevalue("dm")
     monkeypatch.syspath_prepend(ROOT / "examples")
     monkeypatch.setattr(sys, "argv", [f"{example}.py"])
     runpy.run_path(str(ROOT / "examples" / f"{example}.py"), run_name="__main__")

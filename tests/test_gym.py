@@ -17,7 +17,7 @@ from drawing import drawing
 from episodes import KINDS, TIPS, ZEROS, assert_same, some_actions
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.environments import IDS, dm
+from hexmj.environments import IDS
 from hexmj.environments.gym import StickInsect
 from hexmj.environments.vector import StickInsects
 from hexmj.errors import InputError, SimulationError
@@ -43,7 +43,7 @@ def test_it_passes_gymnasiums_checks(name):
 
 
 @KINDS
-def test_the_dm_env_interface_passes_them_by_shimmy(actions):
+def test_the_dm_env_interface_passes_them_by_shimmy(actions, dm):
     from shimmy.dm_control_compatibility import DmControlCompatibilityV0
 
     wrapped = DmControlCompatibilityV0(dm.load(actions=actions))
@@ -124,7 +124,7 @@ def test_zero_offsets_are_the_physical_walk_bit_for_bit(controller, conditions, 
 
 
 @KINDS
-def test_it_is_the_dm_env_environment_in_other_units(actions):
+def test_it_is_the_dm_env_environment_in_other_units(actions, dm):
     """Positions and observations agree bit for bit."""
     walking, other = StickInsect(actions=actions, velocity=0.5), dm.load(0.5, actions=actions, seed=3)
     observed, step = walking.reset(seed=3)[0], other.reset()

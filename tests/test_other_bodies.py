@@ -16,7 +16,6 @@ from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import LDVS
 from hexmj.controllers.feedback import SensoryFeedback
-from hexmj.environments import dm
 from hexmj.errors import InputError
 from hexmj.measures.physical import physical_walk
 from hexmj.physics.outcomes import Outcomes
@@ -105,7 +104,7 @@ def test_a_body_of_other_names_and_lengths_walks(longer: Body):
     assert (walked.qpos[-1, stays] != ours.qpos[-1, stays]).any()
 
 
-def test_a_body_of_other_names_walks_in_the_environment(longer: Body):
+def test_a_body_of_other_names_walks_in_the_environment(longer: Body, dm):
     """Zero offsets are its physical walk to the last bit; its joints go by their own names."""
     walked = physical_walk(draw_starts(1, 3), LDVS, 0.3, 20.0, conditions=conditions(longer))
     walking = dm.load(0.3, actions="tips", conditions=conditions(longer), duration=20.0, seed=3)

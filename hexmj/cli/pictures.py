@@ -51,8 +51,9 @@ class Render(Command):
 
     def run(self, given: SimpleNamespace) -> Answer:
         from hexmj.io import MANIFEST, results_folder
+        from hexmj.rendering.gl import missing
         from hexmj.replay.recording import Start, load_recording, recording_summary, save_recording
-        from hexmj.replay.video import missing, render
+        from hexmj.replay.video import render
 
         film = build(Film, given)
         film.check_format(given.format)

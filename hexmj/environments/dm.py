@@ -9,10 +9,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from dm_control import mujoco
-from dm_control.mujoco import wrapper
-from dm_control.rl import control
-from dm_env import specs
+
+from hexmj.errors import InputError
+
+try:
+    from dm_control import mujoco
+    from dm_control.mujoco import wrapper
+    from dm_control.rl import control
+    from dm_env import specs
+except ModuleNotFoundError:
+    raise InputError("dm_control, which needs Python below 3.13, is not installed: use environments.gym") from None
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.mjcf import check_home, compile_body

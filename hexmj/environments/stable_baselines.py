@@ -13,7 +13,7 @@ from hexmj.errors import InputError, without_extra
 
 try:
     from gymnasium import spaces
-    from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper  # pyright: ignore[reportMissingImports]
+    from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 except ImportError:
     raise without_extra("rl", "stable-baselines3") from None
 

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import xarray as xr
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions
-from hexmj.errors import InputError, RenderingError, without_extra
+from hexmj.errors import InputError, RenderingError
 from hexmj.files import replacing
 from hexmj.progress import Progress, shown
 from hexmj.rendering import gl
@@ -56,7 +55,7 @@ def render(
 
     Raises:
         InputError: no recording or too many, another suffix, a recording without a pose or of another body.
-        RenderingError: nothing can be rendered on this machine, or ffmpeg is missing or fails.
+        RenderingError: nothing can be rendered on this machine, or ffmpeg fails.
     """
     film, path = film or Film(), Path(path)
     if path.suffix not in ENCODINGS:
@@ -64,7 +63,7 @@ def render(
     choice("camera", film.camera, body.cameras)
     film.check_format(path.suffix.removeprefix("."))
     takes = takes_of(recordings, body, MOST_PANELS)
-    if reason := missing():
+    if reason := gl.missing():
         raise RenderingError(reason)
     import imageio_ffmpeg
     import mediapy
@@ -81,12 +80,6 @@ def render(
         except (OSError, RuntimeError) as error:
             raise RenderingError(f"ffmpeg failed: {' '.join(str(error).split()):.300}") from None
     return frames
-
-
-def missing() -> str | None:
-    """Return why this machine cannot make films and what to install; None if it can."""
-    encoder = find_spec("imageio_ffmpeg") and find_spec("mediapy")
-    return gl.missing() or (None if encoder else str(without_extra("film", "mediapy or imageio-ffmpeg")))
 
 
 def _frames(
