@@ -14,8 +14,8 @@ from types import SimpleNamespace
 from hexmj.cli.command import Command
 from hexmj.cli.options import Output
 from hexmj.cli.output import report_checks, show
-from hexmj.controllers import conformance
 from hexmj.errors import InputError
+from hexmj.rendering import PACKAGES
 
 RENDERING = """
 import mujoco
@@ -30,16 +30,18 @@ with mujoco.Renderer(model, 48, 64) as renderer:
 
 
 @dataclass(frozen=True)
-class Finding(conformance.Finding):
-    """Result of one check; it is a note if only an optional package is missing."""
+class Finding:
+    """Result of one check: what it found, or the error and its remedy; the remedy is empty if the cause is unknown."""
 
+    name: str
+    well: bool
+    found: str
     remedy: str = ""
-    """What to do if the check fails."""
 
 
 class Doctor(Command):
-    """List the versions of packages, and check rendering, films and a short walk. A failed check names
-    a remedy, and the exit code is then 1."""
+    """List the versions of packages, and check rendering, films and a short walk. A failed check shows its error, and
+    a remedy if the cause is known; the exit code is then 1."""
 
     sources = (Output,)
     examples = ("", "--json")
@@ -49,13 +51,13 @@ class Doctor(Command):
 
 
 def examine() -> Iterator[Finding]:
-    """Run every check and yield its finding; the error of a failed check becomes the finding."""
-    for name, (check, remedy) in CHECKS.items():
+    """Run every check and yield its finding; the last line of the error of a failed check becomes the finding."""
+    for check in CHECKS:
         try:
-            yield Finding(name, True, check())
+            yield Finding(check.__name__, True, check())
         except Exception as error:
-            absent = name == "films" and isinstance(error, ModuleNotFoundError)
-            yield Finding(name, absent, str(error) or repr(error), absent, remedy)
+            remedies = (remedy for words, remedy in REMEDIES.items() if words in str(error))
+            yield Finding(check.__name__, False, (str(error) or repr(error)).splitlines()[-1], next(remedies, ""))
 
 
 def versions() -> str:
@@ -67,10 +69,11 @@ def versions() -> str:
 
 def rendering() -> str:
     """Check that MuJoCo renders a frame."""
+    setting = f"MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}"
     done = subprocess.run([sys.executable, "-P", "-c", RENDERING], capture_output=True, text=True, timeout=120)
     if done.returncode != 0:
-        raise RuntimeError((done.stderr.strip().splitlines() or [f"the process ended with {done.returncode}"])[-1])
-    return f"a frame with MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}"
+        raise RuntimeError(f"{setting}: {done.stderr.strip() or f'the process ended with {done.returncode}'}")
+    return f"a frame with {setting}"
 
 
 def films() -> str:
@@ -79,10 +82,9 @@ def films() -> str:
     import mediapy
     import numpy as np
 
-    mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-    with tempfile.TemporaryDirectory() as folder:
-        mediapy.write_video(f"{folder}/film.mp4", np.zeros((2, 48, 64, 3), np.uint8), fps=25)
-    return f"two frames through {Path(imageio_ffmpeg.get_ffmpeg_exe()).name}"
+    mediapy.set_ffmpeg(program := imageio_ffmpeg.get_ffmpeg_exe())
+    mediapy.compress_video(np.zeros((2, 48, 64, 3), np.uint8), fps=25)
+    return f"two frames through {Path(program).name}"
 
 
 def walking() -> str:
@@ -101,13 +103,14 @@ def walking() -> str:
     return "two insects walked for 20 time units, with the same bits on one thread and on all"
 
 
-CHECKS: dict[str, tuple[Callable[[], str], str]] = {
-    "versions": (versions, "Install hexmj into a fresh environment with Python 3.11 or newer."),
-    "rendering": (rendering, "Install libegl1 libgl1-mesa-dri libopengl0 and set MUJOCO_GL=egl; only films need it."),
-    "films": (films, "Reinstall imageio-ffmpeg and mediapy, or set IMAGEIO_FFMPEG_EXE; only films need it."),
-    "walking": (walking, "Set NUMBA_CACHE_DIR to a writable folder, or reinstall mujoco and numba."),
+CHECKS: tuple[Callable[[], str], ...] = (versions, rendering, films, walking)
+
+REMEDIES = {  # words of an error -> what to do; the first words that match count
+    "cannot cache": "Set NUMBA_CACHE_DIR to a writable folder.",
+    "MUJOCO_GL=egl": f"Install {PACKAGES} (Debian, Ubuntu); only films need them.",
+    "MUJOCO_GL": "Set MUJOCO_GL=egl.",
+    "ffmpeg": "Unset IMAGEIO_FFMPEG_EXE, or reinstall imageio-ffmpeg; only films need it.",
 }
-"""Name of a check -> its function, and the remedy for its failure."""
 
 
 @dataclass(frozen=True)
@@ -150,8 +153,7 @@ class Rerun(Command):
         versions = {name: [old, new] for name, (old, new) in pairs.items() if old != new}
         equal = not any(files.values())
         if given.json:
-            answer = {"equal": equal, "command": then["command"], "differences": files, "versions": versions}
-            print(json_text(answer))
+            print(json_text({"equal": equal, "command": then["command"], "differences": files, "versions": versions}))
         else:
             show(*(f"{name}: {text or 'all bits are equal'}" for name, text in files.items()))
             show(*(f"version of {name}: {old} in the manifest, {new} now" for name, (old, new) in versions.items()))

@@ -4,6 +4,9 @@ import ctypes
 import os
 import sys
 
+PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
+"""Packages of Debian and Ubuntu with EGL and a software renderer."""
+
 CHOICES = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
 """Environment variables that choose an OpenGL library for MuJoCo or name a display."""
 

@@ -6,9 +6,7 @@ import warnings
 import mujoco
 
 from hexmj.errors import RenderingError
-
-PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
-"""Packages of Debian and Ubuntu with EGL and a software renderer."""
+from hexmj.rendering import PACKAGES
 
 
 class Renderer(mujoco.Renderer):
