@@ -1,6 +1,7 @@
 # make compare    the main job; ARGS="..." adds options
 # make test       quick tests, under three minutes on two cores; ARGS="..." goes to pytest
 # make slow       the other tests: README, examples, notebooks, browser, training
+# make oldest     every feature with the oldest versions that pyproject.toml allows, in .venv/oldest
 # make bench      every speed beside a peer, under ten minutes; ARGS="..." goes to pytest
 # make lint       style and types
 # make docs       the documentation, in results/site; `python3 -m http.server -d results/site` serves it
@@ -16,18 +17,24 @@ GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 GL = $(if $(findstring libEGL.so.1,$(shell PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p)),egl,disable)
 
-.PHONY: compare test slow bench lint docs results gallery system browser
+.PHONY: compare test slow oldest bench lint docs results gallery system browser
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
 	.venv/bin/hexmj compare --out results/compare $(ARGS)
 
-test slow bench: export MUJOCO_GL ?= $(GL)
+test slow oldest bench: export MUJOCO_GL ?= $(GL)
 test: .venv/dev system
 	.venv/bin/python -m pytest -m "not slow" $(TWO_AT_ONCE) $(ARGS)
 
 slow: .venv/dev system browser .venv/rl
 	.venv/bin/python -m pytest -m slow $(TWO_AT_ONCE) $(ARGS)
+
+oldest: system
+	$(PYTHON) -m venv --clear .venv/oldest
+	.venv/oldest/bin/python $(INSTALL) uv
+	.venv/oldest/bin/uv pip install --quiet --python .venv/oldest --resolution lowest-direct ".[search,gym,dask,view]"
+	.venv/oldest/bin/python tests/features.py
 
 bench: .venv/dev system
 	mkdir -p results/bench
