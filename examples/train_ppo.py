@@ -57,8 +57,8 @@ def reward(walked: np.ndarray, felt: np.ndarray, fell: np.ndarray) -> np.ndarray
 
 def main() -> None:
     """Learn the gains, write them, and compare them with LDVS."""
-    import torch  # pyright: ignore[reportMissingImports]
-    from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
+    import torch
+    from stable_baselines3 import PPO
 
     from hexmj.environments.stable_baselines import FeltInsects, HeldInsects
 

@@ -6,7 +6,7 @@ and knows no meshes but those of files.  Masses come from the MJCF; inertias of 
 
 import mujoco
 import numpy as np
-import pinocchio  # pyright: ignore[reportMissingImports]  # lies where only Python's start finds it
+import pinocchio
 import pytest
 
 from hexmj.body import ROOT_QPOS, ROOT_QVEL, STICK_INSECT, Body
