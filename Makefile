@@ -21,7 +21,7 @@ GL = $(if $(findstring libEGL.so.1,$(shell PATH="$$PATH:/sbin:/usr/sbin" ldconfi
 .DELETE_ON_ERROR:
 
 compare: .venv/project system
-	.venv/bin/hexmj compare --out results/compare $(ARGS)
+	.venv/bin/hexmj compare --precision 0.05 --out results/compare $(ARGS)
 
 test slow oldest bench: export MUJOCO_GL ?= $(GL)
 test: .venv/dev system

@@ -49,7 +49,6 @@ MEASURE_STYLES: dict[str, dict[str, Any]] = {
     "grounded": {"color": "#c8740a", "marker": "s", "linestyle": "--", "label": "grounded FLSS: feet at the ground"},
     "carried": {"color": "#2a9d5c", "marker": "D", "linestyle": "--", "label": "carried FLSS: feet that carry load"},
     "physical": {"color": "#b3261e", "marker": "^", "linestyle": "-.", "label": "frequency of falls: trunk on ground"},
-    "toppled": {"color": "#6a4c93", "marker": "x", "linestyle": ":", "label": "toppled: trunk tilts by over 0.1 rad"},
 }
 """Measure -> style and label of its curve; markers and lines differ too, for readers without colours."""
 

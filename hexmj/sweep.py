@@ -21,14 +21,14 @@ from inspect import getsource, signature
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Protocol, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypedDict, Unpack
 
 import numpy as np
 
 from hexmj.errors import InputError, without_extra
 from hexmj.files import read_netcdf, write_netcdf
 from hexmj.plain import digest, plain
-from hexmj.progress import Progress, shown
+from hexmj.progress import Bar, Progress, part_of, shown
 from hexmj.threads import cores
 from hexmj.validate import whole
 
@@ -107,9 +107,35 @@ class Execution(TypedDict, total=False):
     """True computes all cells again and replaces their cached results."""
 
 
+class Round(NamedTuple):
+    """Cells that a study needs next."""
+
+    cells: Sequence[Cell]
+    left: float = 0.0
+    """Estimated work of all later rounds, in the unit of `Cell.work`."""
+    note: str = ""
+    """Text for the progress bar."""
+
+
 def run_study(study: Study, folder: Path | str | None = None, **execution: Unpack[Execution]) -> "xr.Dataset":
-    """Run a study and return its result; arguments and errors are those of `finished_cells`."""
-    return study.result(run_cells(study.cells(), folder, **execution))
+    """Run a study and return its result; arguments and errors are those of `finished_cells`.
+
+    A study may have a method `next_round(data)`, which returns the `Round` that follows after cells with these results;
+    the study ends at a round without cells. Other studies have one round of `cells`.
+    """
+    follow = getattr(study, "next_round", lambda data: Round([] if data else study.cells()))
+    data, rest = list["xr.Dataset"](), 1.0
+    with shown(execution.get("progress"), "computing") as progress:
+        while (now := follow(data)).cells:
+            work = sum(cell.work for cell in now.cells)
+            part = rest * work / (work + now.left)
+            if isinstance(progress, Bar):
+                progress.note(now.note)
+            data += run_cells(now.cells, folder, **execution | {"progress": part_of(progress, part)})
+            rest -= part
+        if progress and rest:
+            progress(rest)
+    return study.result(data)
 
 
 def run_cells(

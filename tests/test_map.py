@@ -106,7 +106,7 @@ def test_the_values_of_every_condition_make_sense():
         for value in condition.values:
             varied: Any = {name: value}
             assert Conditions(**varied).values()[name] == value
-    assert set(FLSS) == {"kinematic", "dynamic", "grounded", "carried", "physical", "toppled", "static"}
+    assert set(FLSS) == {"kinematic", "dynamic", "grounded", "carried", "physical", "static"}
 
 
 @pytest.mark.slow

@@ -30,18 +30,24 @@ FOOT_PATH = ("vp", "step_height", "standing_height", "lift_time", "landing_time"
 EXPLAINED = """\
 t: observation time [time units]
 kinematic: the centre of mass leaves the support polygon of the planned feet
+dynamic: a pendulum on the edge of this polygon tips over (FLDS)
 grounded: it leaves the polygon of the feet at the ground in the simulation
 carried: it leaves the polygon of the feet that carry load in the simulation
 physical: falls, that is, the trunk touches the ground
 
 agree: fraction of starts with both a kinematic loss and a fall, or neither
-both, kin., phys., none: starts with both, only a loss, only a fall, neither"""
+speed: walked over commanded, of starts without a fall"""
 """Lines that explain the tables of `hexmj compare`."""
 
-TOPPLED = "toppled: the trunk tilts by more than 0.1 rad"
+CASES = "both, kin., phys., none: starts with both, only a loss, only a fall, neither"
 
 DYNAMIC = ("vp", "standing_height")
 """Options of `PHYSICAL` on which the dynamic measure depends."""
+
+WALKS = {"walks": "walks", "plain_walks": "plain"}
+"""Number of walks in a result of --precision -> heading of its column."""
+
+PLAIN = "plain: number of walks that random starts would need for an interval of this width"
 
 TIMES = ("planned loss", "grounded loss", "carried loss", "fall")
 """Entries of a walk's summary that are times [time units]; infinity says that the event does not happen."""
@@ -97,6 +103,9 @@ class FlssOptions:
     measure: Measure = "kinematic"
     """Count losses of the planned static stability (kinematic), of the planned dynamic stability (dynamic), or falls of
     the insect in MuJoCo (physical)."""
+    precision: float | None = None
+    """Half width of the 95 % interval of falls that is enough, such as 0.03: 20,000 starts are planned, and as many
+    walk as the interval needs. By default, all of --starts walk."""
     range_of: int | None = None
     """Number of starts that are computed and cached together, by default 1600000; results do not depend on it."""
     conditions: Conditions = Conditions()
@@ -116,7 +125,10 @@ class Flss(StudyCommand):
 
     def build(self, given: SimpleNamespace) -> Any:
         check_measure(given)
+        if given.precision is not None:
+            no_effect(given, ["starts"], "with --precision", {"starts": None})
         if given.measure != "physical":
+            no_effect(given, ["precision"], f"with --measure {given.measure}", {"precision": None})
             return super().build(given)
         from hexmj.measures.compare import PhysicalFlss
 
@@ -143,10 +155,11 @@ class Flss(StudyCommand):
         measure = result.attrs["measure"]
         yield f"{measure} {'FLDS' if measure == 'dynamic' else 'FLSS'} of {result.attrs['model']}"
         yield grid(result, ("velocity",), columns)
+        if "walks" in result:
+            yield PLAIN
         spread = "; sample sd: standard deviation over samples of 1000 starts" if "sample_sd" in columns else ""
         yield f"low, high: 95 % interval; duration: observation time [time units]{spread}"
         if measure == "physical":
-            yield TOPPLED
             yield report_line(physical_report(result))
 
 
@@ -165,6 +178,10 @@ def _over_velocity(result: "xr.Dataset") -> list[str]:
 
 def _four_digits(name: str) -> Column:
     return lambda data: four_digits(data[name].item())
+
+
+def _whole(name: str) -> Column:
+    return lambda data: f"{data[name].item():.0f}"
 
 
 @dataclass(frozen=True)
@@ -198,7 +215,8 @@ class Compare(StudyCommand):
         name, velocities = str(result.controller.values[0]), result.velocity.values
         v = float(velocities[np.abs(velocities - 0.3).argmin()])
         data = result.sel(controller=name, velocity=v).isel(dict.fromkeys(axes_of(result), 0))
-        start = int(np.argmax((np.isinf(data.planned_loss) & np.isinf(data.fall)).values))
+        stable = (np.isinf(data.planned_loss) & np.isinf(data.fall)).values
+        start = int(data.get_index("start")[np.argmax(stable)])
         begun = by_protocol(controller(given, given.controller[0]), given.protocol)
         first = build(Start, given, controller=begun, velocity=v, start=start)
         walked = first.recorded(True, name, given.threads)
@@ -206,14 +224,14 @@ class Compare(StudyCommand):
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         from hexmj.io import settings
-        from hexmj.measures.compare import AGREEMENT, BESIDE, MEASURES, physical_report
+        from hexmj.measures.compare import AGREEMENT, MEASURES, physical_report
         from hexmj.measures.figures import axes_of
 
         summary = {axis: result[axis].values.tolist() for axis in (*axes_of(result), "velocity")}
-        keys = [measure + end for measure in MEASURES | BESIDE for end in ("", "_low", "_high")]
+        keys = [measure + end for measure in MEASURES for end in ("", "_low", "_high")]
+        keys += [key for key in ("agreement", *AGREEMENT, *WALKS) if key in result]
         for name in result.controller.values:
-            data = result.sel(controller=name)
-            summary[name] = {key: data[key].values.tolist() for key in [*keys, "agreement", *AGREEMENT]}
+            summary[name] = {key: result[key].sel(controller=name).values.tolist() for key in keys}
         durations = {"duration": result.duration.values.tolist()}
         return summary | {"report": physical_report(result), "settings": settings(result) | durations}
 
@@ -223,13 +241,17 @@ class Compare(StudyCommand):
 
         axes, names = ("controller", *axes_of(result), "velocity"), ("both", "kin.", "phys.", "none")
         columns: dict[str, Column] = {"t": lambda data: four_digits(data.duration.item())}
-        answers: dict[str, Column] = {"agree": "agreement", **dict(zip(names, AGREEMENT, strict=True))}
-        answers |= {"toppled": lambda data: str(np.isfinite(data.topple).sum().item()), "speed": _speeds}
-        yield "FLSS, frequency of the loss of static stability, with 95 % intervals"
+        answers: dict[str, Column] = {"agree": "agreement"}
+        if study.precision is None:
+            answers |= zip(names, AGREEMENT, strict=True)
+        else:
+            answers |= {name: _whole(key) for key, name in WALKS.items()}
+        answers["speed"] = _speeds
+        yield "Frequency of losses of stability and of falls, with 95 % intervals"
         yield grid(result, axes, columns | {name: name for name in MEASURES})
         yield EXPLAINED
         yield grid(result, axes, answers)
-        yield f"{TOPPLED}; speed: walked over commanded, of starts without a fall"
+        yield CASES if study.precision is None else PLAIN
         yield report_line(physical_report(result))
 
 

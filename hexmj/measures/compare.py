@@ -1,10 +1,10 @@
 """Comparison of the measures of stability on the same starts: planned feet, feet in the simulation, and falls."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Unpack
 
 import numpy as np
 
@@ -14,26 +14,24 @@ from hexmj.controllers.wrappers import Begins
 from hexmj.legs import LEGS
 from hexmj.measures import tables
 from hexmj.measures.figures import UNITS
+from hexmj.measures.precision import MEASURES, PLANNED, StratifiedWalks, plan_table
 from hexmj.measures.study import Study, outcome_table
 from hexmj.starts import draw_starts
-from hexmj.sweep import Cell, Execution, over_axes, run_study
+from hexmj.sweep import Cell, Execution, Round, over_axes, run_study
 from hexmj.timing import Acceleration, Stride
-from hexmj.validate import choice
+from hexmj.validate import choice, number
 
 if TYPE_CHECKING:
     import xarray as xr
 
-MEASURES = {
-    "kinematic": "planned_loss",
-    "dynamic": "dynamic_loss",
-    "grounded": "grounded_loss",
-    "carried": "carried_loss",
-    "physical": "fall",
-}
-"""Measure of FLSS -> outcome, the time of the event that the measure counts."""
+LEAST_PRECISION = 0.005
+"""Minimum of `Comparison.precision`; 20,000 planned starts allow no narrower intervals."""
 
-BESIDE = {"toppled": "topple"}
-"""Further measure -> outcome that it counts: the trunk tilts by more than `outcomes.TOPPLED`, in any direction."""
+PLANNING_COST = 0.002
+"""Computing time of planning a start for the strata, as a fraction of that of its physical walk."""
+
+LIKELY = 150
+"""Number of walks that a precision is expected to need at each point, for the progress bar."""
 
 AGREEMENT = ("both", "only_kinematic", "only_physical", "none")
 """Cases of a start: planned loss and fall, planned loss only, fall only, or neither."""
@@ -69,12 +67,21 @@ class Comparison(Study):
     a leg. The insect then begins with all feet on the tips of the plan, and losses and time count from there."""
     n_starts: int = field(default=60, kw_only=True)
     """Number of random starts, the same in every cell."""
+    precision: float | None = field(default=None, kw_only=True)
+    """Half width of the 95 % intervals that is enough, such as 0.03: 20,000 starts are planned, and as many walk as the
+    intervals need. By default, every start walks."""
     axes: Mapping[str, Sequence[float]] = field(default_factory=dict, kw_only=True)
     """Conditions that are axes of the result, each a number, and their values; the axes form a product."""
+
+    narrowed: ClassVar[Mapping[str, str]] = {name: MEASURES[name] for name in ("grounded", "carried", "physical")}
+    """Measures whose intervals `precision` limits -> outcome."""
 
     def __post_init__(self) -> None:
         for name in self.axes:
             choice("axes", name, SCALARS)
+        if self.precision is not None:
+            number("precision", self.precision, LEAST_PRECISION, 0.5)
+            object.__setattr__(self, "n_starts", PLANNED)
         super().__post_init__()
 
     @property
@@ -84,21 +91,61 @@ class Comparison(Study):
         return [Point(name, conditions, v, t) for name, conditions, (v, t) in every]
 
     def cells(self) -> list[Cell]:
-        """Return a cell for each of `points`, computed by `outcome_table`."""
+        """Return a cell for each of `points`: walks of all starts or, with a precision, the plans of all starts."""
         self.check_walks(self.velocities)
-        cells = []
-        for name, conditions, v, t in self.points:
-            walks = self.walks(v, t, conditions, self.controllers[name])
-            work = walks.work * conditions.substeps(self.stride)
-            cells.append(Cell(f"{name}-V-{v:g}", outcome_table, {"walks": walks}, work))
-        return cells
+        function, cost = (outcome_table, 1.0) if self.precision is None else (plan_table, PLANNING_COST)
+        return [self._cell(point, function, cost) for point in self.points]
+
+    def _cell(self, point: Point, function: Callable[..., Any], cost: float, **own: Any) -> Cell:
+        """Return a cell at a point; `cost` is its computing time as a multiple of that of all walks."""
+        name, conditions, v, t = point
+        walks = self.walks(v, t, conditions, self.controllers[name])
+        work = cost * walks.work * conditions.substeps(self.stride)
+        return Cell(f"{name}-V-{v:g}", function, {"walks": walks, **own}, work)
+
+    def next_round(self, data: Sequence["xr.Dataset"]) -> Round:
+        """Return the cells that are needed after those with these results, see `sweep.run_study`."""
+        if not data:
+            cells = self.cells()
+            walks = 0.0 if self.precision is None else LIKELY / PLANNED / PLANNING_COST
+            return Round(cells, walks * sum(cell.work for cell in cells))
+        if self.precision is None:
+            return Round([])
+        samples, chosen = self._sampled(data)
+        cells, left, widest = [], 0.0, 0.0
+        for point, sample, starts in zip(self.points, samples, chosen, strict=True):
+            if len(starts):
+                cells.append(self._cell(point, outcome_table, len(starts) / self.n_starts, which=starts))
+                left += cells[-1].work * sample.left(self.narrowed, self.precision) / len(starts)
+                widest = max(widest, sample.half_width(self.narrowed))
+        return Round(cells, left, f"half width {widest:.3f} of {self.precision:g}" if widest else "planning")
+
+    def _sampled(self, data: Sequence["xr.Dataset"]) -> tuple[list[StratifiedWalks], list[np.ndarray]]:
+        """Return what has walked at each point, and the starts that walk next, (n,), none if all is precise."""
+        points = len(self.points)
+        samples, batches = [StratifiedWalks(plan) for plan in data[:points]], iter(data[points:])
+        while True:
+            chosen = [sample.next_starts(self.narrowed, self.precision or 1.0) for sample in samples]
+            for sample, starts in zip(samples, chosen, strict=True):
+                if len(starts):
+                    if (batch := next(batches, None)) is None:
+                        return samples, chosen
+                    sample.walk(starts, batch)
+            if not any(map(len, chosen)):
+                return samples, chosen
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the dataset that `compare` describes, from the datasets of all cells."""
-        starts = draw_starts(self.n_starts, self.seed, self.stride)
         axes = {"controller": self.controllers, **self.axes, "velocity": self.velocities}
+        sizes = {name: len(values) for name, values in axes.items()}
+        if self.precision is None:
+            table = _counted(over_axes(sizes, data))
+        else:
+            samples, _ = self._sampled(data)
+            table = over_axes(sizes, [sample.table(self.narrowed) for sample in samples], join="outer", data_vars="all")
+        starts = draw_starts(self.n_starts, self.seed, self.stride)[table.get_index("start")]
         own: Any = {name: (name, list(v), {"units": UNITS.get(name, "1")}) for name, v in self.axes.items()}
-        table = over_axes({name: len(values) for name, values in axes.items()}, data).assign_coords(
+        table = table.assign_coords(
             **tables.velocity_axis(*self.observed),
             **own,
             controller=list(self.controllers),
@@ -106,11 +153,8 @@ class Comparison(Study):
             starts=(("start", "leg"), starts, {"units": "mm", "long_name": "tips at the start"}),
         )
         table.fall_part.attrs["flag_meanings"] = " ".join(self.conditions.body.trunk)
-        lost, fell = table.planned_loss < np.inf, table.fall < np.inf
-        table = with_flss(table, MEASURES | BESIDE)
-        for name, case in zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True):
-            table[name] = case.sum("start").assign_attrs(units="1", long_name="number of starts")
-        return self.labelled(table, "compare")
+        precise = {} if self.precision is None else {"precision": self.precision}
+        return self.labelled(table.transpose(*axes, "start", ...), "compare", **precise)
 
 
 @dataclass(frozen=True)
@@ -119,6 +163,8 @@ class PhysicalFlss(Comparison):
 
     n_starts: int = field(default=200, kw_only=True)
     """Number of random starts, the same for every velocity."""
+
+    narrowed: ClassVar[Mapping[str, str]] = {"physical": "fall"}
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the dataset that `physical_flss` describes, from the datasets of all cells."""
@@ -136,6 +182,7 @@ def compare(
     stride: Stride = Comparison.stride,
     acceleration: Acceleration | None = None,
     protocol: Begins = Comparison.protocol,
+    precision: float | None = None,
     axes: Mapping[str, Sequence[float]] = {},
     folder: Path | None = None,
     **how: Unpack[Execution],
@@ -145,22 +192,26 @@ def compare(
     Args:
         controllers: one controller, or several controllers by name.
         velocities: one or several V_r, each 0 <= V < 1; the final velocities when accelerating.
-        n_starts: number of random starts.
+        n_starts: number of random starts; without effect if there is a precision.
         observation_time: 'walk', 'start' or a number of time units, see `timing.observation_duration`.
         seed: seed of the random starts.
         conditions: V_p, body, ground and contacts of the physical walks.
         stride: step range, lines of the tips and time step.
         acceleration: the accelerating procedure of Eq. 11; without it V_r is constant.
         protocol: 'random' or 'steady', see `Comparison.protocol`; 'steady' allows no acceleration.
+        precision: half width of the 95 % intervals that is enough, see `Comparison.precision`.
         axes: condition -> values, such as {"vp": [40.0, 80.0]}; every condition that is a number can become an axis.
         folder: directory in which finished cells are cached; None caches nothing.
         how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
 
     Returns:
-        Over (controller, *axes, velocity): the FLSS of `MEASURES` and `BESIDE` with their 95 % Wilson intervals
-        (`kinematic`, `kinematic_low`, ...), the number of starts in each case of `AGREEMENT`, and `agreement`, the
-        fraction of starts with a planned loss and a fall, or with neither. Over (controller, *axes, velocity, start):
-        every field of `physics.outcomes.Outcomes`.
+        Over (controller, *axes, velocity): the frequencies of `MEASURES` with their 95 % intervals (`kinematic`,
+        `kinematic_low`, ...), and `agreement`, the fraction of starts with a planned loss and a fall, or with neither.
+        Without a precision, the intervals are Wilson's, and there is the number of starts in each case of `AGREEMENT`.
+        With a precision, there are the number of `walks`, and `plain_walks`, the number that walks from all random
+        starts would need for the same intervals.
+        Over (controller, *axes, velocity, start): every field of `physics.outcomes.Outcomes`; with a precision, only of
+        the starts that have walked, with their `weight` in means over all starts.
 
     Raises:
         InputError: an argument is out of range.
@@ -169,7 +220,7 @@ def compare(
     named = controllers if isinstance(controllers, Mapping) else {getattr(controllers, "name", "?"): controllers}
     walks: Any = {"n_starts": n_starts, "seed": seed, "conditions": conditions, "stride": stride}
     walks |= {"velocities": np.atleast_1d(velocities).tolist(), "observation_time": observation_time}
-    walks |= {"acceleration": acceleration, "protocol": protocol}
+    walks |= {"acceleration": acceleration, "protocol": protocol, "precision": precision}
     walks["axes"] = {name: np.atleast_1d(values).tolist() for name, values in axes.items()}
     return run_study(Comparison(named, **walks), folder, **how)
 
@@ -182,27 +233,42 @@ def physical_flss(
     Args:
         controller: controller that plans the walks.
         velocities: one or several V_r, each 0 <= V < 1.
-        n_starts: number of random starts.
-        options: arguments of `compare`, except `axes`. `contact_gap` has no effect on falls without sensory feedback.
+        n_starts: number of random starts; without effect if there is a precision.
+        options: other fields of `PhysicalFlss`, `folder`, and options of `sweep.Execution`. `contact_gap` has no effect
+            on falls without sensory feedback. A `precision` limits the intervals of falls only.
 
     Returns:
-        The variables of `kinematic.flss` for falls, and the frequency `toppled` with its interval; over
-        (velocity, start) the times `fall` and `topple`, and the outcomes `REPORTED`.
+        Over velocity: `flss`, the frequency of falls, the ends `low` and `high` of its 95 % interval, and the
+        observation time `duration` [time units]; with a precision, `walks` and `plain_walks`, see `compare`. Over
+        (velocity, start): the time `fall`, and the outcomes `REPORTED`.
 
     Raises:
         InputError: an argument is out of range.
         SimulationError: an insect does not come to rest at its start, or a walk diverges.
     """
-    return _falls(compare(controller, velocities, n_starts=n_starts, **options))
+    own = {field.name: options.pop(field.name) for field in fields(PhysicalFlss) if field.name in options}
+    own |= {"velocities": np.atleast_1d(velocities).tolist(), "n_starts": n_starts}
+    study = PhysicalFlss({getattr(controller, "name", "?"): controller}, **own)
+    return run_study(study, options.pop("folder", None), **options)
 
 
 def _falls(result: "xr.Dataset") -> "xr.Dataset":
     """Return the dataset of `physical_flss` from a comparison of one controller."""
-    fell = tables.losses_by_sample(np.isfinite(result.fall.values[0]))
-    table = tables.frequency_table(fell, result.sizes["start"], result.velocity.values, result.duration.values)
-    beside = [measure + end for measure in BESIDE for end in ("", "_low", "_high")]
-    reported = result.isel(controller=0, drop=True)[[*beside, "fall", *BESIDE.values(), *REPORTED]]
-    return table.assign(reported.drop_vars("duration").data_vars).assign_attrs(result.attrs | {"study": "flss"})
+    kept = ("physical", "physical_low", "physical_high", "walks", "plain_walks", "weight", "fall", *REPORTED)
+    falls = result.isel(controller=0, drop=True)[[name for name in kept if name in result]]
+    falls = falls.rename(physical="flss", physical_low="low", physical_high="high").drop_vars(
+        ["leg", "starts"], errors="ignore"
+    )
+    return falls.assign_attrs(result.attrs | {"study": "flss"})
+
+
+def _counted(outcomes: "xr.Dataset") -> "xr.Dataset":
+    """Add the frequency of each measure, and the number of starts in each case of `AGREEMENT`, to outcomes."""
+    lost, fell = outcomes.planned_loss < np.inf, outcomes.fall < np.inf
+    table = with_flss(outcomes)
+    for name, case in zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True):
+        table[name] = case.sum("start").assign_attrs(units="1", long_name="number of starts")
+    return table
 
 
 def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr.Dataset":
@@ -219,11 +285,16 @@ def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr
 
 def physical_report(result: "xr.Dataset") -> dict[str, float]:
     """Return means and extremes over all walks of a result that show how well the bodies followed their plans."""
+    weight = result.weight.fillna(0.0) if "weight" in result else (result.slip > -np.inf).astype(float)
+
+    def mean(name: str) -> float:
+        return result[name].weighted(weight).mean().item()
+
     return {
-        "mean slip [mm/s]": result.slip.mean().item(),
-        "tracking, 95th percentile [mm]": result.tracking.mean().item(),
+        "mean slip [mm/s]": mean("slip"),
+        "tracking, 95th percentile [mm]": mean("tracking"),
         "deepest foot in the ground [mm]": result.depth.max().item(),
-        "joints at their torque limit": result.saturation.mean().item(),
+        "joints at their torque limit": mean("saturation"),
         "tip targets out of reach": result.unreachable.sum().item(),
         "least clearance [mm]": result.clearance.min().item(),
         "greatest tilt [rad]": result.tilt.max().item(),

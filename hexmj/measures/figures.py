@@ -51,7 +51,10 @@ def caption(result: "xr.Dataset", least: int | None = None) -> str:
     """
     recorded = settings(result)
     words = [_controllers(recorded.get("controllers", {}), result)]
-    if "starts" in recorded:
+    if "walks" in result:
+        fewest, most = int(result.walks.min()), int(result.walks.max())
+        words.append(f"{fewest} to {most} of {recorded['starts']} planned starts walk")
+    elif "starts" in recorded:
         words.append(starts_in_words(recorded["starts"]))
     if (time := recorded.get("observation_time")) is not None:
         length = f"{time:g} time units" if isinstance(time, float) else TIMES.get(time, time)

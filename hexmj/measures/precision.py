@@ -1,23 +1,33 @@
-"""Frequencies to a wanted precision: physical walks from stratified starts, where they narrow the interval most.
+"""Frequencies to a wanted precision: physical walks from stratified starts, where they narrow the intervals most.
 
 Planning is so fast that the plans of many starts are known before any body walks.  A start belongs to a stratum by what
-its plan loses: no stability, static stability only, or dynamic stability at a number of velocities V_p around the
-actual one, see `tipping`.  A plan that tips even at a much higher V_p nearly always makes the body fall, one that keeps
+its plan loses: nothing, static stability only, or dynamic stability at a number of velocities V_p around the actual
+one, see `tipping`.  A plan that tips even at a much higher V_p nearly always makes the body fall, and one that keeps
 static stability nearly never, so that walks are needed mainly in between (Neyman 1934, J. R. Stat. Soc. 97).
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hexmj.measures.kinematic import dynamic_losses
-from hexmj.measures.tables import WalkSettings, over_start
+from hexmj.measures.tables import WalkSettings, columns, frequency, over_start
 from hexmj.starts import SAMPLE
 from hexmj.stats import WILSON_Z
 
 if TYPE_CHECKING:
     import xarray as xr
+
+MEASURES = {
+    "kinematic": "planned_loss",
+    "dynamic": "dynamic_loss",
+    "grounded": "grounded_loss",
+    "carried": "carried_loss",
+    "physical": "fall",
+}
+"""Measure -> outcome, the time of the event that the measure counts."""
 
 PLANNED = 20 * SAMPLE
 """Number of planned starts, from which the weights of the strata are known."""
@@ -37,83 +47,120 @@ ADDED = 0.5
 
 def plan_table(walks: WalkSettings, threads: int | None = None) -> "xr.Dataset":
     """Return `planned_loss`, `dynamic_loss` [time units] and `stratum` of every start, over start."""
-    how = {"stride": walks.stride, "acceleration": walks.acceleration, "threads": threads}
-    arguments = walks.starts, walks.controller, walks.velocity, walks.duration
-    conditions, stratum = walks.conditions, np.zeros(walks.n_starts, dtype=int)
-    planned, dynamic = np.array([]), np.array([])
-    for factor in FACTORS:
-        losses = dynamic_losses(*arguments, conditions=replace(conditions, vp=factor * conditions.vp), **how)
-        stratum += np.isfinite(losses.dynamic)
-        if factor == 1.0:
-            planned, dynamic = losses.static, losses.dynamic
-    stratum += np.isfinite(planned)
+    how: Any = {"stride": walks.stride, "acceleration": walks.acceleration, "threads": threads}
+    arguments, vp = (walks.starts, walks.controller, walks.velocity, walks.duration), walks.conditions.vp
+    losses = [
+        dynamic_losses(*arguments, conditions=replace(walks.conditions, vp=factor * vp), **how) for factor in FACTORS
+    ]
+    static, dynamic, _ = losses[FACTORS.index(1.0)]
+    stratum = np.isfinite([static, *(found.dynamic for found in losses)]).sum(axis=0)
     units = {"planned_loss": "time unit", "dynamic_loss": "time unit"}
-    return over_start({"planned_loss": planned, "dynamic_loss": dynamic, "stratum": stratum}, units)
+    return over_start({"planned_loss": static, "dynamic_loss": dynamic, "stratum": stratum}, units)
 
 
 class Estimate(NamedTuple):
     """A frequency that is estimated from stratified walks."""
 
     value: float
-    low: float
-    """Lower end of the 95 % interval."""
-    high: float
-    """Upper end of the 95 % interval."""
+    half: float
+    """Half width of the 95 % interval."""
     plain: float
     """Number of walks from random starts that would give an interval of this width."""
-    wanted: np.ndarray
-    """(stratum,) number of walks that a narrower interval needs, from `StratifiedWalks.estimate`."""
+    spread: np.ndarray
+    """(stratum,) standard deviation of the event in each stratum, times the share of the stratum."""
+
+    def wanted(self, precision: float) -> np.ndarray:
+        """Return the number of walks in each stratum that this half width needs (Neyman allocation), (stratum,)."""
+        return np.ceil(self.spread * self.spread.sum() * (WILSON_Z / precision) ** 2)
 
 
 class StratifiedWalks:
-    """The planned starts of one sample, and which of them have walked."""
+    """The planned starts of one sample, and the outcomes of those that have walked."""
 
-    def __init__(self, stratum: np.ndarray) -> None:
-        """Begin with the stratum of each planned start, (start,), and without walks."""
-        self._stratum = stratum
-        self._share = np.bincount(stratum, minlength=STRATA) / len(stratum)
-        self._walked = np.zeros(STRATA, dtype=int)
-        self.starts = np.array([], dtype=int)
-        """Indices of the starts that have walked."""
+    def __init__(self, plan: "xr.Dataset") -> None:
+        """Begin without walks; `plan` is the result of `plan_table`."""
+        self._plan, self._stratum = plan, plan.stratum.values
+        self._members = [np.flatnonzero(self._stratum == index) for index in range(STRATA)]
+        self._share = np.array([len(some) for some in self._members]) / len(self._stratum)
+        self._starts, self._batches = np.array([], dtype=int), list["xr.Dataset"]()
 
     @property
-    def weight(self) -> np.ndarray:
-        """Weight of each walk in means over all starts, in the order of `starts`; the weights add up to 1."""
-        known = np.where(self._walked > 0, self._share, 0.0)
-        each = known / known.sum() / np.maximum(self._walked, 1)
-        return each[self._stratum[self.starts]]
+    def _walked(self) -> np.ndarray:
+        """(stratum,) number of walks."""
+        return np.bincount(self._stratum[self._starts], minlength=STRATA)
 
-    def walk(self, which: np.ndarray) -> None:
-        """Note that these starts, (n,), have walked."""
-        self.starts = np.concatenate([self.starts, which])
-        self._walked += np.bincount(self._stratum[which], minlength=STRATA)
+    def walk(self, starts: np.ndarray, outcomes: "xr.Dataset") -> None:
+        """Add the outcomes of these starts, (n,), indices of the planned starts."""
+        self._starts = np.concatenate([self._starts, starts])
+        self._batches.append(outcomes)
 
-    def estimate(self, events: np.ndarray, precision: float) -> Estimate:
-        """Estimate the frequency of an event, 0 or 1 for each walk, and the walks that a half width needs."""
-        used = self._walked > 0
-        happened = np.bincount(self._stratum[self.starts], events, STRATA)
-        frequency = happened / np.maximum(self._walked, 1)
-        smooth = (happened + ADDED) / (self._walked + 2.0 * ADDED)  # so that no stratum is treated as certain
+    def _times(self, outcome: str) -> np.ndarray:
+        """Return an outcome of all walks, (walk,)."""
+        return np.concatenate([batch[outcome].values for batch in self._batches])
+
+    def estimate(self, events: np.ndarray) -> Estimate:
+        """Estimate the frequency of an event from whether it happens in each walk, (walk,)."""
+        walked, happened = self._walked, np.bincount(self._stratum[self._starts], events, STRATA)
+        used = walked > 0
+        frequencies = happened / np.maximum(walked, 1)
+        smooth = (happened + ADDED) / (walked + 2.0 * ADDED)  # so that no stratum is treated as certain
+        value, between = float(self._share @ frequencies), float(self._share @ smooth)
         spread = self._share * np.sqrt(smooth * (1.0 - smooth))
-        value, smooth_share = float(self._share @ frequency), float(self._share @ smooth)
-        variance = float((spread[used] ** 2 / self._walked[used]).sum())
-        variance += float(self._share @ (frequency - value) ** 2) / len(self._stratum)  # of the strata's weights
-        half = WILSON_Z * variance**0.5
-        wanted = np.ceil(spread * spread.sum() * (WILSON_Z / precision) ** 2)  # Neyman allocation
-        plain = float(smooth_share * (1.0 - smooth_share)) / variance
-        return Estimate(value, max(0.0, value - half), min(1.0, value + half), plain, wanted)
+        variance = float((spread[used] ** 2 / walked[used]).sum())
+        variance += float(self._share @ (frequencies - value) ** 2) / len(self._stratum)  # of the shares
+        return Estimate(value, WILSON_Z * variance**0.5, between * (1.0 - between) / variance, spread)
 
-    def next_starts(self, wanted: np.ndarray) -> np.ndarray:
-        """Return the starts that walk next towards `wanted` walks in each stratum, at most as many as have walked."""
-        members = [np.flatnonzero(self._stratum == index) for index in range(STRATA)]
-        sizes = np.array([len(some) for some in members])
-        more = np.maximum(np.minimum(wanted, sizes) - self._walked, 0.0)
-        if (most := self._walked.sum()) and more.sum() > most:
+    def next_starts(self, narrowed: Mapping[str, str], precision: float) -> np.ndarray:
+        """Return the starts that walk next, (n,), at most as many as have walked; none if all is precise.
+
+        Args:
+            narrowed: measures that must be precise -> their outcomes.
+            precision: half width of the 95 % interval that is enough.
+        """
+        sizes, walked = np.array([len(some) for some in self._members]), self._walked
+        more = np.maximum(np.minimum(self._wanted(narrowed, precision), sizes) - walked, 0.0)
+        if (most := walked.sum()) and more.sum() > most:
             more = np.ceil(more * most / more.sum())
-        ends = np.minimum(self._walked + more.astype(int), sizes)
-        parts = [some[begin:end] for some, begin, end in zip(members, self._walked, ends, strict=True)]
-        return np.sort(np.concatenate(parts))
+        ends = np.minimum(walked + more.astype(int), sizes)
+        return np.sort(np.concatenate([some[a:b] for some, a, b in zip(self._members, walked, ends, strict=True)]))
 
-    def pilot(self) -> np.ndarray:
-        """Return the first starts that walk."""
-        return self.next_starts(np.full(STRATA, PILOT))
+    def left(self, narrowed: Mapping[str, str], precision: float) -> float:
+        """Return the estimated number of walks that are still needed after the next ones."""
+        missing = np.maximum(self._wanted(narrowed, precision) - self._walked, 0.0).sum()
+        return max(0.0, missing - len(self.next_starts(narrowed, precision)))
+
+    def half_width(self, narrowed: Mapping[str, str]) -> float:
+        """Return the largest half width of the measures' intervals; 0 before the first walk."""
+        return max((one.half for one in self._estimates(narrowed)), default=0.0)
+
+    def _estimates(self, narrowed: Mapping[str, str]) -> list[Estimate]:
+        return [self.estimate(np.isfinite(self._times(name))) for name in narrowed.values()] if self._batches else []
+
+    def _wanted(self, narrowed: Mapping[str, str], precision: float) -> np.ndarray:
+        """Return the number of walks in each stratum, (stratum,), that all measures together need."""
+        estimates = self._estimates(narrowed)
+        wide = [one.wanted(precision) for one in estimates if one.half > precision]
+        if not estimates:
+            return np.full(STRATA, PILOT)
+        return np.max(wide, axis=0) if wide else np.zeros(STRATA)
+
+    def table(self, narrowed: Mapping[str, str]) -> "xr.Dataset":
+        """Return the outcomes and the weight of each walk over start, and all frequencies with their intervals.
+
+        `walks` is the number of walks, and `plain_walks` that of random walks for the same intervals of `narrowed`.
+        """
+        import xarray as xr
+
+        table = xr.concat(self._batches, "start").assign_coords(start=self._starts)
+        estimates = {name: self.estimate(np.isfinite(self._times(outcome))) for name, outcome in MEASURES.items()}
+        new: dict[str, Any] = {}
+        for name, (value, half, _, _) in estimates.items():
+            if (outcome := MEASURES[name]) in self._plan:
+                new |= frequency(name, np.isfinite(self._plan[outcome].values), ())
+            else:
+                new |= columns(name, (), *np.clip([value, value - half, value + half], 0.0, 1.0))
+        same = np.isfinite(self._times("planned_loss")) == np.isfinite(self._times("fall"))
+        new |= {"agreement": self.estimate(same).value, "walks": len(self._starts)}
+        new["plain_walks"] = max(estimates[name].plain for name in narrowed)
+        new["weight"] = "start", (self._share / np.maximum(self._walked, 1))[self._stratum[self._starts]]
+        return table.assign(new).sortby("start")

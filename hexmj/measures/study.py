@@ -188,16 +188,27 @@ def kept_walk(walks: WalkSettings, starts: np.ndarray, **execution: Any) -> "Phy
     return physical_walk(starts, walks.controller, walks.velocity, walks.duration, **how, **execution)
 
 
-def outcome_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
-    """Return every field of `Outcomes`, (start,), of the physical walks with these settings."""
-    from hexmj.measures.physical import physical_outcomes
-    from hexmj.physics.settle import settle_plan
+def outcome_table(
+    walks: WalkSettings,
+    which: np.ndarray | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> "xr.Dataset":
+    """Return every field of `Outcomes`, (start,), of the physical walks with these settings.
 
+    `which` are the indices of the starts that walk, (n,), by default all.
+    """
+    from hexmj.measures.physical import physical_outcomes
+    from hexmj.physics.settle import settle, settle_plan
+
+    starts = walks.starts if which is None else walks.starts[which]
     if isinstance(walks.controller, FromSteadyState):
-        plan = begin(walks.controller, walks.starts, walks.velocity, walks.stride, threads=threads)
+        plan = begin(walks.controller, starts, walks.velocity, walks.stride, threads=threads)
         settled = settle_plan(plan, walks.conditions, threads)
+    elif which is not None:
+        settled = settle(starts, walks.conditions, walks.stride, threads)
     else:
         settled = settled_starts(walks.n_starts, walks.seed, walks.conditions, walks.stride, threads)
-    how: Any = {"starts": walks.starts, "acceleration": walks.acceleration, "threads": threads, "progress": progress}
+    how: Any = {"starts": starts, "acceleration": walks.acceleration, "threads": threads, "progress": progress}
     outcomes = physical_outcomes(settled, walks.controller, walks.velocity, walks.duration, **how)
     return over_start(vars(outcomes), UNITS)

@@ -10,7 +10,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller, FeedbackPlan
 from hexmj.errors import InputError
-from hexmj.measures.compare import BESIDE, MEASURES
+from hexmj.measures.compare import MEASURES
 from hexmj.measures.figures import caption
 from hexmj.measures.study import UNITS, Study, by_halves, kept_walk, standing_starts
 from hexmj.measures.tables import WalkSettings, differences, frequency, happened, over_start, velocity_axis
@@ -49,7 +49,7 @@ CONDITIONS: dict[Over, Axis] = {
 }
 """Condition -> its default values, unit and name; the animal's own centre of mass lies at -9.4 mm."""
 
-FLSS = MEASURES | BESIDE | {"static": "static_loss"}
+FLSS = MEASURES | {"static": "static_loss"}
 """Measure -> outcome, the time of the event that it counts. `static` counts losses of the planned polygon around the
 body's own centre of mass; `kinematic` counts those around O, which are the same under all conditions."""
 
