@@ -24,7 +24,7 @@ from hexmj.validate import choice, number
 if TYPE_CHECKING:
     import xarray as xr
 
-LEAST_PRECISION = 0.005
+LEAST_PRECISION = 0.01
 """Minimum of `Comparison.precision`; 20,000 planned starts allow no narrower intervals."""
 
 PLANNING_COST = 0.002

@@ -68,10 +68,12 @@ class Estimate(NamedTuple):
     """Number of walks from random starts that would give an interval of this width."""
     spread: np.ndarray
     """(stratum,) standard deviation of the event in each stratum, times the share of the stratum."""
+    shared: float
+    """Variance that is due to the shares of the strata, which walks do not narrow."""
 
     def wanted(self, precision: float) -> np.ndarray:
         """Return the number of walks in each stratum that this half width needs (Neyman allocation), (stratum,)."""
-        return np.ceil(self.spread * self.spread.sum() * (WILSON_Z / precision) ** 2)
+        return np.ceil(self.spread * self.spread.sum() / ((precision / WILSON_Z) ** 2 - self.shared))
 
 
 class StratifiedWalks:
@@ -82,7 +84,7 @@ class StratifiedWalks:
         self._plan, self._stratum = plan, plan.stratum.values
         self._members = [np.flatnonzero(self._stratum == index) for index in range(STRATA)]
         self._share = np.array([len(some) for some in self._members]) / len(self._stratum)
-        self._starts, self._batches = np.array([], dtype=int), list["xr.Dataset"]()
+        self._starts, self.batches = np.array([], dtype=int), list["xr.Dataset"]()
 
     @property
     def _walked(self) -> np.ndarray:
@@ -92,11 +94,11 @@ class StratifiedWalks:
     def walk(self, starts: np.ndarray, outcomes: "xr.Dataset") -> None:
         """Add the outcomes of these starts, (n,), indices of the planned starts."""
         self._starts = np.concatenate([self._starts, starts])
-        self._batches.append(outcomes)
+        self.batches.append(outcomes)
 
     def _times(self, outcome: str) -> np.ndarray:
         """Return an outcome of all walks, (walk,)."""
-        return np.concatenate([batch[outcome].values for batch in self._batches])
+        return np.concatenate([batch[outcome].values for batch in self.batches])
 
     def estimate(self, events: np.ndarray) -> Estimate:
         """Estimate the frequency of an event from whether it happens in each walk, (walk,)."""
@@ -106,9 +108,9 @@ class StratifiedWalks:
         smooth = (happened + ADDED) / (walked + 2.0 * ADDED)  # so that no stratum is treated as certain
         value, between = float(self._share @ frequencies), float(self._share @ smooth)
         spread = self._share * np.sqrt(smooth * (1.0 - smooth))
-        variance = float((spread[used] ** 2 / walked[used]).sum())
-        variance += float(self._share @ (frequencies - value) ** 2) / len(self._stratum)  # of the shares
-        return Estimate(value, WILSON_Z * variance**0.5, between * (1.0 - between) / variance, spread)
+        shared = float(self._share @ (frequencies - value) ** 2) / len(self._stratum)
+        variance = float((spread[used] ** 2 / walked[used]).sum()) + shared
+        return Estimate(value, WILSON_Z * variance**0.5, between * (1.0 - between) / variance, spread, shared)
 
     def next_starts(self, narrowed: Mapping[str, str], precision: float) -> np.ndarray:
         """Return the starts that walk next, (n,), at most as many as have walked; none if all is precise.
@@ -118,7 +120,10 @@ class StratifiedWalks:
             precision: half width of the 95 % interval that is enough.
         """
         sizes, walked = np.array([len(some) for some in self._members]), self._walked
-        more = np.maximum(np.minimum(self._wanted(narrowed, precision), sizes) - walked, 0.0)
+        wanted = self._wanted(narrowed, precision)
+        while wanted.any() and (walked < sizes).any() and (np.minimum(wanted, sizes) <= walked).all():
+            wanted = np.ceil(1.05 * wanted)  # other strata have more walks than their part
+        more = np.maximum(np.minimum(wanted, sizes) - walked, 0.0)
         if (most := walked.sum()) and more.sum() > most:
             more = np.ceil(more * most / more.sum())
         ends = np.minimum(walked + more.astype(int), sizes)
@@ -134,7 +139,7 @@ class StratifiedWalks:
         return max((one.half for one in self._estimates(narrowed)), default=0.0)
 
     def _estimates(self, narrowed: Mapping[str, str]) -> list[Estimate]:
-        return [self.estimate(np.isfinite(self._times(name))) for name in narrowed.values()] if self._batches else []
+        return [self.estimate(np.isfinite(self._times(name))) for name in narrowed.values()] if self.batches else []
 
     def _wanted(self, narrowed: Mapping[str, str], precision: float) -> np.ndarray:
         """Return the number of walks in each stratum, (stratum,), that all measures together need."""
@@ -151,10 +156,10 @@ class StratifiedWalks:
         """
         import xarray as xr
 
-        table = xr.concat(self._batches, "start").assign_coords(start=self._starts)
+        table = xr.concat(self.batches, "start").assign_coords(start=self._starts)
         estimates = {name: self.estimate(np.isfinite(self._times(outcome))) for name, outcome in MEASURES.items()}
         new: dict[str, Any] = {}
-        for name, (value, half, _, _) in estimates.items():
+        for name, (value, half, *_) in estimates.items():
             if (outcome := MEASURES[name]) in self._plan:
                 new |= frequency(name, np.isfinite(self._plan[outcome].values), ())
             else:
