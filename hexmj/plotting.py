@@ -31,7 +31,6 @@ FIGURES: dict[str, dict[str, str]] = {
         "walks": "studies.league_figure:walks_figure",
         "prediction": "studies.league_figure:prediction_figure",
     },
-    "ablate": {"ablation": "studies.ablation:ablation_figure"},
     "search": {"convergence": "search.results:convergence_figure"},
     "recording": {"walk": "replay.take:walk_figure"},
 }

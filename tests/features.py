@@ -348,7 +348,6 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "view recording": lambda: view("walk.nc"),
     "view session": view_session,
     "league": f"{LEAGUE} --controller ldvs graham wilson-ideal tripod.py:Tripod --dt 0.5 --vp 200 --no-video",
-    "ablate": "ablate --controller ldvs walknet --velocity 0.8 --starts 10 --physical-starts 1 --dt 0.5",
     "map V_p": lambda: resumed("map --over vp --values 40 160 --velocity 0.8 --starts 4 --observation-time 20"),
     "map centre of mass": (
         "map --over centre_of_mass --values -5 0 --velocity 0.8 --starts 3 --observation-time 20 --vp 200"

@@ -71,7 +71,7 @@ def test_every_field_of_a_study_and_its_conditions_is_an_option_or_hidden(name):
     assert not {*getattr(study, "hidden", ())} & {*given}
 
 
-@pytest.mark.parametrize("name", [name for name in STUDIES if name != "ablate"])
+@pytest.mark.parametrize("name", STUDIES)
 def test_without_options_a_study_has_its_own_defaults(name):
     chosen = command(name)
     study = chosen.build(chosen.parse(name, []))  # pyright: ignore[reportAttributeAccessIssue]
@@ -165,7 +165,6 @@ BAD = [
     "biology --periods 1",
     "league --controller",
     "league --velocity",
-    "ablate --controller wilson",
     "search --velocity 0.1 0.2 0.3",
     "search --form lvds",
     "search --load 1",

@@ -18,7 +18,6 @@ import hexmj
 from hexmj.errors import InputError
 from hexmj.plotting import FIGURES
 from hexmj.search.stages import history
-from hexmj.studies.ablation import Ablation, switched
 from hexmj.studies.biology import Biology
 from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.studies.league import League
@@ -31,8 +30,13 @@ from tiers import few_of
 
 PHYSICAL: dict[str, Any] = {"n_starts": 3, "observation_time": 20.0}
 KINEMATIC: dict[str, Any] = {"n_starts": 20, "observation_time": 20.0, "kinematic": True, "strategies": ["reorganise"]}
-FEW: dict[str, Any] = {"n_starts": 3, "physical_starts": 2, "periods": 12}
-SHORT: dict[str, Any] = FEW | {"trial_starts": 1, "observation_time": 10.0}
+SHORT: dict[str, Any] = {
+    "n_starts": 3,
+    "physical_starts": 2,
+    "periods": 12,
+    "trial_starts": 1,
+    "observation_time": 10.0,
+}
 NAME = "ß: 1 $"
 """A name that JSON escapes, and that figures could set as a formula."""
 
@@ -61,7 +65,6 @@ MADE: dict[str, Callable[[], xr.Dataset]] = {
     "disturb": lambda: run_study(DisturbedWalks(hexmj.LDVS, [0.5, 0.6], ["halt", "leg"], **KINEMATIC)),
     "biology": lambda: run_study(Biology(hexmj.LDVS, 4, n_starts=2)),
     "league": lambda: run_study(League(entrants(("ldvs", "hws")), (0.5, 0.7), **SHORT)),
-    "ablate": lambda: run_study(Ablation(switched("ldvs"), [0.5, 0.7], **FEW)),
     "search": searched,
     "recording": recorded,
 }

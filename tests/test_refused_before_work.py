@@ -11,7 +11,6 @@ from hexmj.controllers.wrappers import LegLost, PoorSenses
 from hexmj.environments.learned import WithOffsets
 from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss
-from hexmj.studies.ablation import Ablation, wholes
 from hexmj.studies.biology import Biology
 from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.studies.league import League
@@ -95,7 +94,6 @@ FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
         Terrain(LIMITED, **FAST),
         DisturbedWalks(LIMITED, disturbances=("push",), impulses=(1.0,), strategies=(), **FAST),
         Biology(LIMITED, n_starts=2),
-        Ablation({"limited": LIMITED}, **FAST, physical_starts=1),
         Terrain(hexmj.SensoryFeedback(LIMITED), **FAST),
         Terrain(LegLost(LIMITED, 0), **FAST),
         Terrain(PoorSenses(hexmj.SensoryFeedback(LIMITED)), **FAST),
@@ -138,9 +136,8 @@ def test_a_load_without_trials_refuses_no_league() -> None:
         ("controllers", League, {"controllers": {}}),
         ("load", League, {"conditions": hexmj.Conditions(load=2.0)}),
         ("ideal_start", entrants, {"names": ("ldvs-ideal",)}),
-        ("controllers", wholes, {"names": ("ldvs", "ldvs-without-3")}),
-        ("velocit", Ablation, {"velocities": (0.0, 0.5)}),
-        ("periods", Ablation, {"periods": 3}),
+        ("velocit", League, {"velocities": (0.0, 0.5)}),
+        ("periods", League, {"periods": 3}),
         ("periods", Biology, {"periods": 3}),
         ("vp", Biology, {"conditions": hexmj.Conditions(vp=38.0)}),
         ("ground", Biology, {"conditions": hexmj.Conditions(ground="rough")}),
@@ -162,6 +159,6 @@ def test_a_load_without_trials_refuses_no_league() -> None:
     ],
 )
 def test_bad_input_is_refused(name: str, study: Any, wrong: dict[str, Any]) -> None:
-    one: Any = {"controllers": {"ldvs": hexmj.LDVS}} if study in (League, Ablation) else {"controller": hexmj.LDVS}
+    one: Any = {"controllers": {"ldvs": hexmj.LDVS}} if study is League else {"controller": hexmj.LDVS}
     with pytest.raises(hexmj.InputError, match=name):
         study(**({} if "names" in wrong else one) | wrong)

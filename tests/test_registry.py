@@ -5,11 +5,13 @@ from dataclasses import replace
 from importlib.metadata import EntryPoint
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hexmj
 from hexmj.controllers import registry
 from hexmj.controllers.cruse1998 import network_toml
+from hexmj.controllers.cruse1998.weights import general
 from hexmj.controllers.protocol import settings_of
 from hexmj.controllers.registry import searched_on
 from stepwise_ldvs import Own
@@ -76,6 +78,24 @@ def test_controllers_by_name(mine, tmp_path, monkeypatch):
     assert hexmj.load_controller("robot").name == "taller"
     assert hexmj.load_controller("robot-without-2").name == "taller-without-2"
     assert "robot" in registry.known_names()
+
+
+@pytest.mark.parametrize("part", ["without-1", "without-3", "without-4", "with-2"])
+@pytest.mark.parametrize("name", ["ldvs", "own-0.3"])
+def test_a_mechanism_that_is_switched_off_has_no_weights_and_the_others_keep_theirs(name, part):
+    whole, changed = (general(hexmj.load_controller(one).weights) for one in (name, f"{name}-{part}"))  # pyright: ignore
+    for kind in ("p1", "p2", "p31", "p32", "p33", "p34", "p4"):
+        now, before = getattr(changed, kind), getattr(whole, kind)
+        if kind[1] != part[-1]:
+            assert np.array_equal(now, before)
+        else:
+            assert now.any() == part.startswith("with-")
+
+
+def test_without_all_mechanisms_the_network_is_uncoordinated():
+    nothing, starts = LDVS.without(1).without(3).without(4), hexmj.draw_starts(50, 0)
+    one, other = (hexmj.first_loss(starts, controller, 0.3, 100.0) for controller in (nothing, hexmj.UNCOORDINATED))
+    assert np.array_equal(one, other)
 
 
 def from_fields(text: str) -> dict[str, Any]:
@@ -166,6 +186,8 @@ def test_our_own_sets_name_the_seeds_of_their_searches(name, found):
         "mine_of_a_user.py:number",
         "mine_of_a_user.py:Needy",
         "cpg-wave-without-1",
+        "ldvs-without-2",
+        "walknet-with-2",
     ],
 )
 def test_wrong_names_are_refused(mine, name):

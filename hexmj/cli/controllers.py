@@ -1,4 +1,4 @@
-"""`hexmj league`, `hexmj ablate`, `hexmj search` and `hexmj check-controller`."""
+"""`hexmj league`, `hexmj search` and `hexmj check-controller`."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -87,60 +87,6 @@ class League(StudyCommand):
         walks = {name: build(Start, given, controller=given.entrants[name], **start) for name in best}
         shown = [walk.recorded(True, name, given.threads) for name, walk in walks.items()]
         return files + filmed(given.out / "league.mp4", shown, Film(width=480, height=360))
-
-
-@dataclass(frozen=True)
-class AblateOptions:
-    """Options of `hexmj ablate` that its study does not have."""
-
-    controllers: tuple[str, ...] = ("ldvs", "walknet")
-    """Complete controllers: weight sets of the 1998 network, walknet or walknet-reacog."""
-
-
-class Ablate(StudyCommand):
-    """Measure the contribution of each mechanism of the 1998 network or rule of Walknet: leave it out and walk the same
-    starts, in kinematic walks, in the steady-state gait and in physics. Repeat the command to resume a stopped run."""
-
-    study = "studies.ablation:Ablation"
-    own = (AblateOptions,)
-    planning = ()
-    hidden = ("periods",)
-    data = "ablation.nc"
-    figures = {"ablation": "ablation"}  # noqa: RUF012
-    examples = ("--controller ldvs --velocity 0.5", "--controller walknet --starts 200 --physical-starts 20")
-
-    def build(self, given: SimpleNamespace) -> Any:
-        from hexmj.studies.ablation import Ablation, wholes
-
-        distinct("--controller", given.controller)
-        return build(Ablation, given, controllers=wholes(given.controller))
-
-    def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        from hexmj.studies.ablation import MEASURES
-
-        for measure, title in MEASURES.items():
-            data = result.sel(measure=measure)
-            starts = data.frequency_starts.max().item()
-            heading = f"{measure}: {title}; frequency over {starts} starts"
-            yield f"{heading} (minus that of the complete controller; * if the difference is significant)"
-            velocities = result.velocity.values
-            rows = [
-                (name, *(_ablated(data.sel(controller=name, velocity=v)) for v in velocities))
-                for name in result.controller.values
-            ]
-            yield table(("controller", *(f"V = {v:g}" for v in velocities)), rows)
-
-
-def _ablated(data: "xr.Dataset") -> str:
-    """Return the text of a table's cell: the frequency, and its difference from that of the complete controller."""
-    starts, physical = data.frequency_starts.item(), data.measure.item() == "physical"
-    frequency = "-" if not starts else f"{data.frequency.item():.3f}"
-    frequency += f" of {starts}" if physical and 0 < starts < data.attrs["physical_starts"] else ""
-    change = data.more.item()
-    if data.controller.item() == data.whole.item() or change != change:
-        return frequency
-    significant = "*" if data.more_low.item() > 0 or data.more_high.item() < 0 else ""
-    return f"{frequency} ({f'{change:+.2f}'.replace('0.', '.')}{significant})"
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,6 @@ Studies
 
 Controllers
   league            all controllers on the same starts: tables, figures, film
-  ablate            what each mechanism of a controller contributes
   search            parameters that minimise the FLSS
   check-controller  interface checks of a controller
 
@@ -56,7 +55,7 @@ MODULES = {
     "measures": ("walk", "flss", "compare"),
     "pictures": ("render", "page", "export", "view"),
     "studies": ("map", "disturb", "terrain", "converge", "biology"),
-    "controllers": ("league", "ablate", "search", "check-controller"),
+    "controllers": ("league", "search", "check-controller"),
     "paper": ("reproduce",),
     "machine": ("doctor", "rerun"),
 }

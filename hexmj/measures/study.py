@@ -134,8 +134,6 @@ class Study:
         conditions = {k: v for k, v in self.conditions.settings().items() if k not in (*self.hidden, *self.varies)}
         made = {"study": study, "protocol": self.protocol} | shared | own | {"conditions": conditions}
         return table.assign_attrs(attributes(made))
-        conditions = {k: v for k, v in self.conditions.settings().items() if k not in (*self.hidden, *self.varies)}
-        return table.assign_attrs(attributes({"study": study} | shared | own | {"conditions": conditions}))
 
 
 @lru_cache(maxsize=8)

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 FRESH = 17
 """Seed of starts on which no preset was optimised."""
 
-PERIODS = 40
-"""Default number of cycles that every leg walks until its steady-state gait is measured."""
-
 VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
 """Attributes of the coordinate `velocity`."""
 

@@ -1,7 +1,7 @@
 """The league: all entrants (controllers) in kinematic walks, physical walks and trials, with a cell for each."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from hexmj.conditions import Conditions
@@ -10,10 +10,12 @@ from hexmj.controllers.planning import begin, check_velocities
 from hexmj.controllers.protocol import Controller, FeedbackPlan, SteerableController
 from hexmj.controllers.wrappers import Begins, LegLost, PoorSenses, by_protocol
 from hexmj.errors import InputError
-from hexmj.measures.study import GROUND
+from hexmj.gaits import CYCLES
+from hexmj.measures.study import GROUND, Study
+from hexmj.measures.tables import FRESH
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import Case
-from hexmj.studies.league_cells import ControllerStudy, EntrantWalks, is_ideal
+from hexmj.studies.league_cells import EntrantWalks, is_ideal
 from hexmj.studies.standings import LEGS_LOST, READING, TRIALS, standings
 from hexmj.sweep import Cell
 from hexmj.timing import Acceleration, observation_duration
@@ -54,18 +56,24 @@ HELD = 1.2
 
 
 @dataclass(frozen=True)
-class League(ControllerStudy):
+class League(Study):
     """All starts of every entrant in kinematic walks, and the first of these starts in physical walks and in trials.
 
     An entrant with a name that ends with '-ideal' walks from its ideal start only, see `league_cells.is_ideal`.
     """
 
+    controllers: Mapping[str, Controller]
+    """Controllers by their names in the result."""
     velocities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+    """Velocities V_r as fractions of V_p, 0 < V < 1."""
     physical_starts: int = 200
+    """Number of starts in physical walks at every velocity, the first ones of all starts."""
     trial_starts: int = 50
     """Number of starts in each trial, the first ones of all starts."""
     trial_velocity: float = 0.3
     """Velocity V_r of the trials."""
+    periods: int = 40
+    """Number of cycles that every leg walks until its steady-state gait is measured."""
     accelerating: bool = True
     """Whether to add kinematic walks that accelerate to V_r = 0.9; they take half of the kinematic computing time."""
     observation_time: str | float = "walk"
@@ -75,11 +83,20 @@ class League(ControllerStudy):
     """Where kinematic and physical walks at constant V begin: at 'random' starts, or in the 'steady' state that the
     plan reaches from them in ten periods of a leg. Ideal starts, accelerating walks and trials do not change."""
 
+    n_starts: int = field(default=1000, kw_only=True)
+    """Number of random starts in kinematic walks, the same for every controller and velocity."""
+    seed: int = field(default=FRESH, kw_only=True)
+    """Seed of the random starts."""
+
     hidden: ClassVar[tuple[str, ...]] = ("load", *GROUND)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        whole("physical_starts", self.physical_starts, 1)
         whole("trial_starts", self.trial_starts, 1)
+        whole("periods", self.periods, CYCLES + 2)
+        if not (self.observed[0] > 0).all():
+            raise InputError(f"velocities = {self.velocities}; expected 0 < V < 1")
         if not 0 < self.trial_velocity < 1:
             raise InputError(f"trial_velocity = {self.trial_velocity}; expected 0 < V < 1")
 

@@ -1,8 +1,8 @@
-"""Controllers of a league or an ablation, and their cells: kinematic losses, steady-state gaits, falls and trials."""
+"""Controllers of a league, and their cells: kinematic losses, steady-state gaits, falls and trials."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,15 +12,14 @@ from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import VARIED, known_names, load_controller
 from hexmj.errors import InputError
-from hexmj.gaits import CYCLES, steady_state_gait
+from hexmj.gaits import steady_state_gait
 from hexmj.measures.kinematic import first_loss
-from hexmj.measures.study import UNITS, Study, by_halves, standing_starts
-from hexmj.measures.tables import FRESH, PERIODS, WalkSettings, happened, over_start
+from hexmj.measures.study import UNITS, by_halves, standing_starts
+from hexmj.measures.tables import WalkSettings, happened, over_start
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import Case, StableWalks, TooFewStable
 from hexmj.timing import observation_duration, steps_within
-from hexmj.validate import whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,31 +72,6 @@ def short_names(found: Mapping[str, Controller]) -> dict[str, str]:
         short[name] = name if (varied["name"] if varied else name) in known else controller.name
     often = Counter(short.values())
     return {name: name if often[shown] > 1 else shown for name, shown in short.items()}
-
-
-@dataclass(frozen=True)
-class ControllerStudy(Study):
-    """A study of several controllers: all starts in kinematic walks, and the first of them in physical walks too."""
-
-    controllers: Mapping[str, Controller]
-    """Controllers by their names in the result."""
-    velocities: Sequence[float] = (0.1, 0.3, 0.5, 0.7)
-    """Velocities V_r as fractions of V_p, 0 < V < 1."""
-    physical_starts: int = 100
-    """Number of starts in physical walks at every velocity, the first ones of all starts."""
-    periods: int = PERIODS
-    """Number of cycles that every leg walks until its steady-state gait is measured."""
-    n_starts: int = field(default=1000, kw_only=True)
-    """Number of random starts in kinematic walks, the same for every controller and velocity."""
-    seed: int = field(default=FRESH, kw_only=True)
-    """Seed of the random starts."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        whole("physical_starts", self.physical_starts, 1)
-        whole("periods", self.periods, CYCLES + 2)
-        if not (self.observed[0] > 0).all():
-            raise InputError(f"velocities = {self.velocities}; expected 0 < V < 1")
 
 
 @dataclass(frozen=True)
