@@ -347,7 +347,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "view live": lambda: view("--velocity 0.5"),
     "view recording": lambda: view("walk.nc"),
     "view session": view_session,
-    "league": f"{LEAGUE} --controller ldvs graham wilson-ideal tripod.py:Tripod --dt 0.5 --vp 200 --no-video",
+    "league": f"{LEAGUE} --controller ldvs graham wilson tripod.py:Tripod --dt 0.5 --vp 200 --no-video",
     "map V_p": lambda: resumed("map --over vp --values 40 160 --velocity 0.8 --starts 4 --observation-time 20"),
     "map centre of mass": (
         "map --over centre_of_mass --values -5 0 --velocity 0.8 --starts 3 --observation-time 20 --vp 200"

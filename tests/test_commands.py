@@ -280,10 +280,10 @@ def test_answers_name_controllers_that_were_searched_on_the_same_starts(run, tmp
 
 def test_a_quick_league_takes_its_sizes_unless_others_are_given():
     chosen = command("league")
-    words = ["--quick", "--controller", "ldvs", "wilson-ideal", "--velocity", "0.5", "--starts", "10"]
+    words = ["--quick", "--controller", "ldvs", "wilson", "--velocity", "0.5", "--starts", "10"]
     study = chosen.build(chosen.parse("league", words))  # pyright: ignore[reportAttributeAccessIssue]
     assert (study.velocities, study.n_starts, study.physical_starts, study.trial_starts) == ((0.5,), 10, 8, 4)
-    assert [*study.controllers] == ["ldvs", "wilson-ideal"]
+    assert [*study.controllers] == ["ldvs", "wilson"]
 
 
 # ---- ends ----

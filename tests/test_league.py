@@ -14,7 +14,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.cruse1998 import network_toml
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import settings_of
-from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
+from hexmj.errors import OutOfReach, SimulationError, StillThrown
 from hexmj.measures.figures import network_rules
 from hexmj.measures.kinematic import first_loss, flss, flss_over_range
 from hexmj.measures.physical import physical_walk
@@ -24,7 +24,7 @@ from hexmj.plotting import FEWER, NOTHING
 from hexmj.starts import draw_starts
 from hexmj.stats import paired_difference
 from hexmj.studies.league import League
-from hexmj.studies.league_cells import EVERYONE, EntrantWalks, entrants, is_ideal, short_names, unless_refused
+from hexmj.studies.league_cells import EVERYONE, EntrantWalks, entrants, unless_refused
 from hexmj.studies.league_figure import league_figure, walks_figure
 from hexmj.studies.standings import TRIALS, by_rank, league_markdown, ranks, tables
 from hexmj.sweep import run_cells
@@ -32,7 +32,7 @@ from hexmj.timing import Stride
 from standing_still import Still, Stretched
 
 SHORT: dict[str, Any] = {"accelerating": False, "periods": 12, "seed": 0}
-NAMES = ("wilson", "ldvs", "graham-ideal")
+NAMES = ("wilson", "ldvs")
 
 
 @pytest.fixture(scope="module")
@@ -89,13 +89,10 @@ def test_differences_are_those_on_the_same_starts(result) -> None:
 
 @pytest.mark.slow
 def test_what_cannot_be_asked_is_not_known(result) -> None:
-    still, ideal = (result.sel(entrant=name) for name in ("still", "graham-ideal"))
+    still = result.sel(entrant="still")
     assert np.isnan(still.fell.sel(trial=["halt", "leg", "push", "reads", "noise", "late"])).all()
     assert np.isfinite(still.fell.sel(trial=["load", "lost 1"])).all()
     assert np.isnan(result.fell.sel(trial=["step", "rough"])).all()  # 12 mm of way
-    assert np.isnan(ideal.fell).all() and np.isnan(ideal.range) and (ideal.kinematic_starts == 1).all()
-    assert (ideal.best == 0).all()
-    assert by_rank(result).entrant.values[-1] == "graham-ideal"
 
 
 def test_nobody_is_pushed_in_a_window_that_holds_no_push(league: League) -> None:
@@ -228,12 +225,9 @@ def test_everyone_is_found_and_can_be_asked_everything() -> None:
     takes_part = entrants(EVERYONE)
     assert len(takes_part) == len(EVERYONE)
     named = League(takes_part).named_cells()
-    for name, entrant in takes_part.items():
+    for name in takes_part:
         asked = {what for one, what in named if one == name}
-        assert "physics 0.5" in asked and "kinematic 0.5" in asked
-        assert is_ideal(name, entrant) != ({*TRIALS} <= asked)
-    with pytest.raises(InputError, match="ideal_start"):
-        entrants(("ldvs-ideal",))
+        assert {"physics 0.5", "kinematic 0.5", *TRIALS} <= asked
 
 
 OWN = """
@@ -255,7 +249,4 @@ def test_controllers_of_files_have_short_and_distinct_names(tmp_path: Path, monk
     Path("own.py").write_text(OWN)
     Path("found.toml").write_text(network_toml(hexmj.LDVS))
     expected = {"own.py:One": "one", "own.py:Ldvs": "own.py:Ldvs", "found.toml": "found", "ldvs": "ldvs"}
-    assert short_names({name: hexmj.load_controller(name) for name in expected}) == expected
-    takes_part = entrants(("own.py:One", "own.py:One-ideal", "graham-ideal"))
-    assert [*takes_part] == ["one", "one-ideal", "graham-ideal"]
-    assert [is_ideal(*entrant) for entrant in takes_part.items()] == [False, True, True]
+    assert entrants([*expected]) == {short: hexmj.load_controller(name) for name, short in expected.items()}

@@ -1,6 +1,6 @@
 """What a later cell would refuse is refused before the first one, and nothing is cached."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,6 @@ from hexmj.measures.kinematic import KinematicFlss
 from hexmj.studies.biology import Biology
 from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.studies.league import League
-from hexmj.studies.league_cells import entrants
 from hexmj.studies.stability_map import StabilityMap
 from hexmj.studies.static_limit import StaticLimit
 from hexmj.studies.terrain import Terrain
@@ -68,9 +67,6 @@ class Limited(Counts):
     def begin_at_speed(self, *how: Any, **others: Any) -> Any:
         return self.begin(*how, **others)
 
-    def ideal_start(self, velocity: float, stride: hexmj.Stride) -> np.ndarray:
-        return hexmj.draw_starts(1, 0, stride)
-
 
 @dataclass(frozen=True)
 class Still:
@@ -100,7 +96,6 @@ FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
         Terrain(WithOffsets(Still(), controller=LIMITED), **FAST),
         League({"limited": LIMITED}, (0.1, 0.3), **FEW),
         League({"limited": LIMITED}, (0.1,), trial_velocity=0.3, **FEW),
-        League({"limited-ideal": LIMITED}, (0.1, 0.3), **FEW),
     ],
     ids=lambda study: type(study).__name__,
 )
@@ -111,23 +106,9 @@ def test_every_study_asks_for_limits_before_its_cells(study) -> None:
     assert len(LIMITED.begun) == begun
 
 
-def test_ideal_entrants_are_asked_only_for_their_velocities() -> None:
-    assert League({"limited-ideal": LIMITED}, (0.1,), **FEW).cells()
-
-
 def test_walks_that_accelerate_are_not_refused_before_the_work() -> None:
     accelerating = KinematicFlss(LIMITED, **FAST, acceleration=hexmj.Acceleration())
     assert len(accelerating.cells()) == 2
-
-
-def test_a_load_without_trials_refuses_no_league() -> None:
-    """Entrants from ideal starts take no trials."""
-    graham = {"graham-ideal": hexmj.load_controller("graham")}
-    league = League(graham, velocities=(0.5,), conditions=hexmj.Conditions(grasp=10.0))
-    assert len(league.cells()) == 2
-    tried = replace(league, controllers={"ldvs": hexmj.LDVS})
-    with pytest.raises(hexmj.InputError, match="grasp = 10"):
-        tried.cells()
 
 
 @pytest.mark.parametrize(
@@ -135,7 +116,6 @@ def test_a_load_without_trials_refuses_no_league() -> None:
     [
         ("controllers", League, {"controllers": {}}),
         ("load", League, {"conditions": hexmj.Conditions(load=2.0)}),
-        ("ideal_start", entrants, {"names": ("ldvs-ideal",)}),
         ("velocit", League, {"velocities": (0.0, 0.5)}),
         ("periods", League, {"periods": 3}),
         ("periods", Biology, {"periods": 3}),
@@ -161,4 +141,4 @@ def test_a_load_without_trials_refuses_no_league() -> None:
 def test_bad_input_is_refused(name: str, study: Any, wrong: dict[str, Any]) -> None:
     one: Any = {"controllers": {"ldvs": hexmj.LDVS}} if study is League else {"controller": hexmj.LDVS}
     with pytest.raises(hexmj.InputError, match=name):
-        study(**({} if "names" in wrong else one) | wrong)
+        study(**one | wrong)

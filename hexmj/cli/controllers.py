@@ -29,8 +29,7 @@ class LeagueOptions:
     """Options of `hexmj league` that its study does not have."""
 
     controllers: tuple[str, ...] | None = None
-    """Controllers that take part, by default all of the league. With -ideal after its name (wilson-ideal), a controller
-    begins with the leg configuration of its own steady-state gait."""
+    """Controllers that take part, by default all of the league."""
     quick: bool = False
     """Run a small league: four controllers, V = 0.1, 0.5 and 0.9, 200 starts, of which 8 walk in physics and 4 in each
     trial. Values that you give for these options take precedence."""
@@ -52,12 +51,12 @@ class League(StudyCommand):
 
     def build(self, given: SimpleNamespace) -> Any:
         from hexmj.studies.league import League
-        from hexmj.studies.league_cells import EVERYONE, FOUR, IDEAL, entrants
+        from hexmj.studies.league_cells import EVERYONE, FOUR, entrants
 
         names = (FOUR if given.quick else EVERYONE) if given.controller is None else given.controller
         distinct("--controller", names)
         given.entrants = entrants(names)
-        given.controller = list(dict.fromkeys(name.removesuffix(IDEAL) for name in names))
+        given.controller = names
         if given.quick:
             defaults = {option.name: option.default for option in option_fields(League, "")}
             vars(given).update((name, value) for name, value in QUICK.items() if vars(given)[name] == defaults[name])
@@ -75,16 +74,14 @@ class League(StudyCommand):
         from hexmj.files import write_text
         from hexmj.replay.film import Film
         from hexmj.replay.recording import Start
-        from hexmj.studies.league_cells import is_ideal
         from hexmj.studies.standings import by_rank, league_markdown
 
         files = [write_text(given.out / "league.md", league_markdown(result))]
-        ranked = by_rank(result).entrant.values.tolist()
-        best = [name for name in ranked if not is_ideal(name, given.entrants[name])][:FILMED]
-        if given.no_video or not best:
+        if given.no_video:
             return files
+        best = by_rank(result).entrant.values.tolist()
         start: Any = {"velocity": given.trial_velocity, "start": 0, "acceleration": None}
-        walks = {name: build(Start, given, controller=given.entrants[name], **start) for name in best}
+        walks = {name: build(Start, given, controller=given.entrants[name], **start) for name in best[:FILMED]}
         shown = [walk.recorded(True, name, given.threads) for name, walk in walks.items()]
         return files + filmed(given.out / "league.mp4", shown, Film(width=480, height=360))
 

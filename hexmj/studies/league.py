@@ -15,7 +15,7 @@ from hexmj.measures.study import GROUND, Study
 from hexmj.measures.tables import FRESH
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import Case
-from hexmj.studies.league_cells import EntrantWalks, is_ideal
+from hexmj.studies.league_cells import EntrantWalks
 from hexmj.studies.standings import LEGS_LOST, READING, TRIALS, standings
 from hexmj.sweep import Cell
 from hexmj.timing import Acceleration, observation_duration
@@ -57,10 +57,7 @@ HELD = 1.2
 
 @dataclass(frozen=True)
 class League(Study):
-    """All starts of every entrant in kinematic walks, and the first of these starts in physical walks and in trials.
-
-    An entrant with a name that ends with '-ideal' walks from its ideal start only, see `league_cells.is_ideal`.
-    """
+    """All starts of every entrant in kinematic walks, and the first of these starts in physical walks and in trials."""
 
     controllers: Mapping[str, Controller]
     """Controllers by their names in the result."""
@@ -81,7 +78,7 @@ class League(Study):
 
     protocol: Begins = "random"
     """Where kinematic and physical walks at constant V begin: at 'random' starts, or in the 'steady' state that the
-    plan reaches from them in ten periods of a leg. Ideal starts, accelerating walks and trials do not change."""
+    plan reaches from them in ten periods of a leg. Accelerating walks and trials do not change."""
 
     n_starts: int = field(default=1000, kw_only=True)
     """Number of random starts in kinematic walks, the same for every controller and velocity."""
@@ -108,11 +105,10 @@ class League(Study):
         """Return the cells of all entrants; raise InputError if an entrant refuses a velocity."""
         from hexmj.physics.settle import check_adhesion
 
-        random = [name for name, controller in self.controllers.items() if not is_ideal(name, controller)]
-        for name, controller in self.controllers.items():
-            more = (self.trial_velocity, RANGE[1], *([FINAL] if self.accelerating else [])) if name in random else ()
+        more = self.trial_velocity, RANGE[1], *([FINAL] if self.accelerating else [])
+        for controller in self.controllers.values():
             check_velocities(controller, (*self.observed[0].tolist(), *more), self.stride)
-        for load in (self.conditions.load, *([LOAD] if random else [])):
+        for load in (self.conditions.load, LOAD):
             check_adhesion(replace(self.conditions, load=load), self.stride, self.seed)
         return [*self.named_cells().values()]
 
@@ -124,13 +120,13 @@ class League(Study):
         return self.labelled(standings(self.controllers, self.observed[0], found), "league", **own)
 
     def _questions(self, name: str) -> Iterator[tuple[str, Cell]]:
-        """Yield questions and cells of an entrant; an entrant with an ideal start has no cells for gaits and trials."""
+        """Yield questions and cells of an entrant."""
         from hexmj.physics.pushes import can_push
 
         controller, every = self.controllers[name], self.n_starts
-        ideal, tried = is_ideal(name, controller), self._time(self.trial_velocity)
+        tried = self._time(self.trial_velocity)
         seeded = every, self.seed, Conditions(), self.stride
-        walks = EntrantWalks(controller, self.trial_velocity, tried, *seeded, ideal=ideal)
+        walks = EntrantWalks(controller, self.trial_velocity, tried, *seeded)
         physics = {"conditions": self.conditions, "n_starts": min(self.physical_starts, every)}
         trials = {"conditions": self.conditions, "n_starts": min(self.trial_starts, every)}
 
@@ -141,14 +137,11 @@ class League(Study):
 
         for v, time in zip(*(axis.tolist() for axis in self.observed), strict=True):
             at: dict[str, Any] = {"velocity": v, "duration": time}
-            begun = at if ideal else at | {"controller": by_protocol(controller, self.protocol)}
+            begun = at | {"controller": by_protocol(controller, self.protocol)}
             yield cell(f"kinematic {v}", time * KINEMATIC_COST, "losses", begun)
             yield cell(f"physics {v}", time, "outcomes", begun | physics)
-            if not ideal:
-                few = at | {"n_starts": min(every, MOST_GAIT_STARTS)}
-                yield cell(f"gait {v}", 25 * time * KINEMATIC_COST, "gaits", few, periods=self.periods)
-        if ideal:
-            return
+            few = at | {"n_starts": min(every, MOST_GAIT_STARTS)}
+            yield cell(f"gait {v}", 25 * time * KINEMATIC_COST, "gaits", few, periods=self.periods)
         low, high = RANGE
         own = {"low": low, "high": high, "observation_time": self.observation_time}
         yield cell("range", 600 * KINEMATIC_COST, "losses_over_range", {"velocity": low}, **own)

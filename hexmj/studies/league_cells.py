@@ -11,7 +11,6 @@ from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import VARIED, known_names, load_controller
-from hexmj.errors import InputError
 from hexmj.gaits import steady_state_gait
 from hexmj.measures.kinematic import first_loss
 from hexmj.measures.study import UNITS, by_halves, standing_starts
@@ -24,17 +23,14 @@ from hexmj.timing import observation_duration, steps_within
 if TYPE_CHECKING:
     import xarray as xr
 
-IDEAL = "-ideal"
-"""Suffix of the name of an entrant that walks from its ideal start instead of random starts."""
-
 OWN = ("own", "own-0.3", "own-0.5", "robust-0.1", "lasting", "lasting-0.3")
 NETWORK = ("uncoordinated", "hws", "ldvs", "ldvs-tripod", *OWN)
 """Weight sets of the 1998 network that take part in the league."""
 
-EVERYONE = (*NETWORK, *BASELINES, *(f"{name}{IDEAL}" for name in ("wilson", "graham")))
+EVERYONE = (*NETWORK, *BASELINES)
 """Names of all entrants of the league."""
 
-FOUR = ("ldvs", "uncoordinated", "wilson", "graham-ideal")
+FOUR = ("ldvs", "uncoordinated", "wilson", "graham")
 """Names of the entrants of a quick league."""
 
 EFFORT = {"work": "mm", "torque": "1", "way": "mm"}
@@ -44,50 +40,23 @@ DISTURBED = {"time": "time unit", "fall": "time unit"}
 """Column of `StableWalks.times` that `EntrantWalks.disturbed` uses -> its unit."""
 
 
-def is_ideal(name: str, controller: Controller) -> bool:
-    """Return whether an entrant always walks from its `ideal_start(velocity, stride)`, tips (1, leg) [mm]."""
-    return name.endswith(IDEAL) and hasattr(controller, "ideal_start")
-
-
 def entrants(names: Sequence[str]) -> dict[str, Controller]:
-    """Load controllers by name, each perhaps with the suffix `IDEAL`, and return them by `short_names`.
+    """Load controllers and return them by distinct names for tables: hexmj's own names, else the controller's `name`.
 
     Raises:
-        InputError: there is no controller of this name, or a controller with the suffix has no ideal start.
+        InputError: there is no controller of this name.
     """
-    plain = {name: name.removesuffix(IDEAL) for name in names}
-    found = {name: load_controller(name) for name in plain.values()}
-    short = short_names(found)
-    for name, own in plain.items():
-        if own != name and not is_ideal(name, found[own]):
-            raise InputError(f"controller = {name}; {own} has no method ideal_start")
-    return {short[own] + IDEAL * (own != name): found[own] for name, own in plain.items()}
-
-
-def short_names(found: Mapping[str, Controller]) -> dict[str, str]:
-    """Return name -> distinct name for tables: hexmj's own names as they are, else the controller's `name`."""
-    known, short = {*known_names()}, {}
+    found, known, short = {name: load_controller(name) for name in names}, {*known_names()}, {}
     for name, controller in found.items():
         varied = VARIED.fullmatch(name)
         short[name] = name if (varied["name"] if varied else name) in known else controller.name
     often = Counter(short.values())
-    return {name: name if often[shown] > 1 else shown for name, shown in short.items()}
+    return {name if often[short[name]] > 1 else short[name]: controller for name, controller in found.items()}
 
 
 @dataclass(frozen=True)
 class EntrantWalks(WalkSettings):
     """Walks of one entrant. The methods are functions of cells, and return a dataset over start."""
-
-    ideal: bool = False
-    """Whether the entrant walks from its ideal start only, see `is_ideal`."""
-
-    @property
-    def starts(self) -> np.ndarray:
-        """Tips at time 0, (start, leg) [mm]."""
-        if not self.ideal:
-            return super().starts
-        controller: Any = self.controller
-        return np.array(controller.ideal_start(self.velocity, self.stride), dtype=float)
 
     def losses(self, threads: int | None = None) -> "xr.Dataset":
         """Return `lost`: 1 for each start that loses static stability in its planned walk, else 0."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from hexmj.measures.figures import caption, starts_in_words
 from hexmj.plotting import FEWER, LEGEND, MEASURE_STYLES, NOTHING, head, heat_map, in_figure, interval, picture, tidy
-from hexmj.studies.standings import ABOUT_TRIALS, MEASURES, by_rank, from_one, place
+from hexmj.studies.standings import ABOUT_TRIALS, MEASURES, by_rank, place
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +52,7 @@ def league_figure(result: "xr.Dataset") -> "Figure":
         panels.append(Panel(f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer, SHARE))
     first = shown.entrant.values[shown.best.sel(measure="physical").values == 1]
     finding = f"fewest falls over all velocities: {', '.join(first[:4])}" + " and others" * (len(first) > 4)
-    figure, axes, images = _drawn(finding, shown, panels, in_figure(from_one(shown)), beside=1)
+    figure, axes, images = _drawn(finding, shown, panels, beside=1)
     figure.colorbar(images[0], ax=axes[:-1], location="bottom", label="share of the starts", fraction=0.03, aspect=80)
     _dots(axes[-1], shown)
     return figure
@@ -85,7 +85,7 @@ def walks_figure(result: "xr.Dataset") -> "Figure":
 def prediction_figure(result: "xr.Dataset") -> "Figure":
     """Draw the frequency of falls against FLDS and kinematic FLSS near V = 0.5, with a point for each entrant."""
     at = result.sel(velocity=0.5, method="nearest")
-    at = at.isel(entrant=np.flatnonzero(at.best.sel(measure="physical") > 0))
+    at = at.isel(entrant=np.flatnonzero(at.physical.notnull()))
     figure, falls = picture(7.0, 6.0), at.physical.values
     axes = figure.subplots()
     axes.axline((0.0, 0.0), slope=1.0, color="0.6", linewidth=1.0)
@@ -111,7 +111,7 @@ def prediction_figure(result: "xr.Dataset") -> "Figure":
 
 
 def _drawn(
-    finding: str, shown: "xr.Dataset", panels: list[Panel], note: str, beside: int = 0
+    finding: str, shown: "xr.Dataset", panels: list[Panel], note: str = "", beside: int = 0
 ) -> "tuple[Figure, Any, list[AxesImage]]":
     """Draw panels with a row for each entrant, and leave `beside` more axes empty; return figure, axes, heat maps."""
     rows, images = shown.sizes["entrant"], []

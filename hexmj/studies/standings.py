@@ -11,7 +11,6 @@ from hexmj.measures.figures import network_rules, starts_in_words
 from hexmj.measures.tables import VELOCITY, differences, frequencies, happened, over_cells
 from hexmj.phases import circular_mean
 from hexmj.stats import paired_difference
-from hexmj.studies.league_cells import is_ideal
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +41,7 @@ OPTIONAL = ("lost", "fell", "reached", "stable", "duty_factor", "ipsilateral", "
 """Variables of cells that some entrants do not have; they become NaN."""
 
 REFERENCE = "ldvs"
-"""Entrant to which all others are compared; if it does not take part, the first entrant with random starts is used."""
+"""Entrant to which all others are compared; if it does not take part, the first entrant is used."""
 
 
 def standings(
@@ -82,17 +81,14 @@ def standings(
     events = {"kinematic": planned.lost}
     events |= {measure: happened(walked[f"{measure}_loss"]) for measure in ("dynamic", "grounded", "carried")}
     events["physical"] = walked.fell
-    ideal = np.array([is_ideal(*entrant) for entrant in entrants.items()])
-    random = [name for name, begins in zip(names, ideal, strict=True) if not begins]
-    reference = REFERENCE if REFERENCE in random else next(iter(random), "")
+    reference = REFERENCE if REFERENCE in names else names[0]
     table: dict[str, Any] = {}
     places = []
     for measure in MEASURES:
-        values = events[measure]
-        same = np.where(ideal[:, None, None], np.nan, values)  # ideal starts cannot be compared pairwise
-        table |= frequencies(measure, values.values, OVER_VELOCITY)
-        table |= differences(f"{measure}_above", same, same[names.index(reference or names[0])], OVER_VELOCITY)
-        places.append(ranks(same.mean(axis=1)))
+        values = events[measure].values
+        table |= frequencies(measure, values, OVER_VELOCITY)
+        table |= differences(f"{measure}_above", values, values[names.index(reference)], OVER_VELOCITY)
+        places.append(ranks(values.mean(axis=1)))
     best, worst = np.transpose(places, (1, 2, 0))
     table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
     for question in ("range", "accelerated"):
@@ -185,16 +181,9 @@ def league_markdown(result: "xr.Dataset") -> str:
 
 
 def by_rank(result: "xr.Dataset") -> "xr.Dataset":
-    """Sort entrants by mean physical FLSS, then by mean kinematic FLSS; entrants with ideal starts come last."""
+    """Sort entrants by mean physical FLSS, then by mean kinematic FLSS; entrants without any come last."""
     falls, losses = (result[measure].mean("velocity").values for measure in ("physical", "kinematic"))
-    unranked = result.best.sel(measure="physical").values == 0
-    return result.isel(entrant=np.lexsort((losses, falls, unranked))).transpose("entrant", ...)
-
-
-def from_one(result: "xr.Dataset") -> str:
-    """Return the names of the entrants that walk from one ideal start, as a text; empty if all entrants or none do."""
-    alone = (result.kinematic_starts == 1).all("velocity").values
-    return f"{', '.join(result.entrant.values[alone])} from one start" if alone.any() and not alone.all() else ""
+    return result.isel(entrant=np.lexsort((losses, falls))).transpose("entrant", ...)
 
 
 def frequency(cell: "xr.Dataset", name: str) -> str:
@@ -240,9 +229,7 @@ def _over_velocity(shown: "xr.Dataset", measure: str, title: str) -> Table:
 
     rows = _rows(shown, lambda entrant: [text(entrant.isel(velocity=i)) for i in range(shown.sizes["velocity"])])
     reference, starts = shown.attrs["reference"], shown[f"{measure}_starts"].max().item()
-    title += f" of {starts_in_words(starts)}"
-    title += f"; {LESS} below {reference} on the same starts, {MORE} above" if reference else ""
-    title += f"; {alone}" if (alone := from_one(shown)) else ""
+    title += f" of {starts_in_words(starts)}; {LESS} below {reference} on the same starts, {MORE} above"
     return Table(title, ("controller", *(f"V = {v:g}" for v in shown.velocity.values)), rows)
 
 

@@ -6,8 +6,8 @@ in anti-phase.  Graham's Gait I: the tripod at every velocity.
 
 Mapping: the period is (AEP_0 - PEP_0) (1 + 1/V), in which a swing goes from PEP_0 to AEP_0 at V_p. Fitted by us:
 nothing. Sensed: nothing, not even the tips at time 0. The clock is at 0 when the walk begins, and the first step lifts
-each leg whose swing has begun by then. From `ideal_start` every leg is in phase with the clock. With a random phase,
-the clock begins at a time that depends on the start, and lifts each leg at its next beat.
+each leg whose swing has begun by then. With a random phase, the clock begins at a time that depends on the start, and
+lifts each leg at its next beat.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from hexmj.controllers.baselines.lifted import Legs, Lifted
-from hexmj.timing import Stride
 
 BEHIND = np.array([2.0, 1.0, 0.0, 2.0, 1.0, 0.0])
 """(leg,) number of swings of the same side that precede the leg's swing."""
@@ -54,13 +53,6 @@ class Metronome(Lifted):
         time = state.time + legs.stride.dt / span * _swing_part(legs.v)
         swings = np.floor(time - self._lag(legs.v))
         return Clock(time, np.maximum(swings, state.swings)), swings > state.swings
-
-    def ideal_start(self, velocity: float, stride: Stride) -> np.ndarray:
-        """Return the tips that are in phase with the clock at time 0, (1, leg) [mm]; swinging legs stand there too."""
-        v = np.array([[velocity]])
-        phase, swing = -self._lag(v) % 1.0, _swing_part(v)
-        part = np.where(phase < swing, phase / swing, (1.0 - phase) / (1.0 - swing))  # 0 at PEP_0, 1 at AEP_0
-        return stride.pep0 + (stride.aep0 - stride.pep0) * part
 
     def _lag(self, v: np.ndarray) -> np.ndarray:
         """Return the lag of each leg behind the clock, (start, leg) [periods]."""
