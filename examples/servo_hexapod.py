@@ -194,12 +194,11 @@ def main(n_starts: int = 40) -> None:
     figure, panels = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True, layout="constrained")
     for axes, (name, cells) in zip(panels, walks.items(), strict=True):
         answers = fallen(cells, n_starts)
-        for measure in ("kinematic", "toppled", "physical"):
-            style = MEASURE_STYLES[measure]
-            axes.plot(answers.vp, answers[measure], **style)
-            print(
-                f"{name}, {style['label']}: {dict(zip(cells, answers[measure].values.round(3).tolist(), strict=True))}"
-            )
+        tilted = (answers.tilt > 0.1).mean("start"), {"color": "#6a4c93", "label": "trunk tilts by over 0.1 rad"}
+        curves = [(answers[measure], MEASURE_STYLES[measure]) for measure in ("kinematic", "physical")]
+        for values, style in [*curves, tilted]:
+            axes.plot(answers.vp, values, **style)
+            print(f"{name}, {style['label']}: {dict(zip(cells, values.values.round(3).tolist(), strict=True))}")
         axes.set(title=f"{name}, V = 0.5", xscale="log", xlabel="swing velocity V_p [mm/s]", ylim=(-0.03, 1))
         axes.set_xticks(list(cells), [f"{vp:g}" for vp in cells], minor=False)
         axes.minorticks_off()

@@ -20,7 +20,7 @@ from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_outcomes, physical_walk, physical_walk_of_plan
 from hexmj.physics.engine import STATE
 from hexmj.physics.foot_path import OrdersFromPlan
-from hexmj.physics.outcomes import TOPPLED, OutcomesSoFar
+from hexmj.physics.outcomes import OutcomesSoFar
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import Settled, settle
 from hexmj.rotations import heading, rotated, turned
@@ -276,8 +276,6 @@ def test_outcomes_are_what_the_chunks_show(controller, velocity, vp, strength):
         taken = len(q) - 1 if fell else round(duration / dt) * m
         assert outcomes.clearance[start] == pytest.approx(lowest.min())
         assert outcomes.tilt[start] == pytest.approx(np.arccos(upright.min()))
-        beyond = np.flatnonzero(np.arccos(upright) > TOPPLED)
-        assert outcomes.topple[start] == (pytest.approx(beyond[0] / m * dt) if beyond.size else np.inf)
         assert outcomes.slip[start] == pytest.approx(slid / contacts / compiled.model.opt.timestep)
         assert outcomes.saturation[start] == (torques >= 0.999 * compiled.torque_limits).mean()
         assert outcomes.depth[start] == max(0.0, np.concatenate(depth)[: len(q) - fell].max())

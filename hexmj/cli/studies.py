@@ -87,7 +87,6 @@ def _mechanisms(result: "xr.Dataset") -> Iterator[list[str]]:
     for v in result.velocity.values:
         data = result.sel(velocity=v)
         counts = {name: data["count"].sel(mechanism_name=name).values for name in result.mechanism_name.values}
-        counts["toppled"] = (data.topple < float("inf")).sum("start").values
         yield from ([f"{v:g}", name.replace("_", " "), *map(str, n)] for name, n in counts.items() if n.any())
 
 

@@ -271,10 +271,10 @@ def _counted(outcomes: "xr.Dataset") -> "xr.Dataset":
     return table
 
 
-def with_flss(data: "xr.Dataset", measures: Mapping[str, str] = MEASURES) -> "xr.Dataset":
-    """Add the FLSS of each measure with its 95 % Wilson interval, and `agreement`, to outcomes over (..., start)."""
+def with_flss(data: "xr.Dataset") -> "xr.Dataset":
+    """Add the FLSS of `MEASURES` with its 95 % Wilson interval, and `agreement`, to outcomes over (..., start)."""
     new: dict[str, Any] = {}
-    for measure, outcome in measures.items():
+    for measure, outcome in MEASURES.items():
         lost = tables.happened(data[outcome]).transpose(..., "start")
         new |= tables.frequency(measure, lost.values, tuple(map(str, lost.dims[:-1])))
         new[measure][2]["long_name"] = f"{measure} FLSS"

@@ -30,7 +30,7 @@ GROUND = "ground", "ground_height", "ground_at", "ground_length", "ground_seed"
 """Conditions that describe the ground; some studies set them and therefore hide them, see `Study.hidden`."""
 
 UNITS = {
-    **dict.fromkeys(("planned_loss", "dynamic_loss", "grounded_loss", "carried_loss", "fall", "topple"), "time unit"),
+    **dict.fromkeys(("planned_loss", "dynamic_loss", "grounded_loss", "carried_loss", "fall"), "time unit"),
     **dict.fromkeys(("clearance", "tracking", "depth"), "mm"),
     **{"tilt": "rad", "slip": "mm/s"},
 }

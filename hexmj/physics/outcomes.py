@@ -18,17 +18,11 @@ from hexmj.stability import loss_time, walk_margin
 from hexmj.tipping import Pendulum, TipsSoFar
 from hexmj.walks import PlannedWalk, Walk
 
-TOPPLED = 0.1
-"""Tilt of the trunk, in any direction, beyond which a start counts as toppled [rad]."""
-
 GROUNDED = 0.1
 """Height of a foot's lowest point, as a fraction of the standing height, below which the foot is at the ground."""
 
 MOST_UNREACHABLE = 0.1
 """Maximum share of a walk's foot targets that may be out of reach."""
-
-LEAST_UPRIGHT = float(np.cos(TOPPLED))
-"""Upward component of the trunk's vertical axis, a unit vector, at the tilt `TOPPLED`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,8 +39,6 @@ class Outcomes:
     """(start,) first loss of static stability: feet that carry load, the body's own centre of mass [time units]."""
     fall: np.ndarray
     """(start,) first contact of the trunk with the ground [time units]; environments use `observing.judge`."""
-    topple: np.ndarray
-    """(start,) time at which the trunk first tilts by more than `TOPPLED`, 0.1 rad [time units]."""
     fall_part: np.ndarray
     """(start,) index in `Body.trunk` of the part that touches the ground first; -1 without a fall."""
     clearance: np.ndarray
@@ -69,7 +61,7 @@ class Outcomes:
 
     def __repr__(self) -> str:
         times = {"planned loss": self.planned_loss, "grounded loss": self.grounded_loss}
-        times |= {"carried loss": self.carried_loss, "fell": self.fall, "toppled": self.topple}
+        times |= {"carried loss": self.carried_loss, "fell": self.fall}
         counts = ", ".join(f"{name} {np.isfinite(time).sum()}" for name, time in times.items())
         least = f"; least clearance {self.clearance.min():.3g} mm" if len(self.fall) else ""
         return f"Outcomes(of {len(self.fall)}: {counts}{least})"
@@ -82,8 +74,6 @@ class _Sums(NamedTuple):
     """(start,) see `Outcomes.clearance`."""
     upright: np.ndarray
     """(start,) least upward component of the trunk's vertical axis, a unit vector."""
-    toppled: np.ndarray
-    """(start,) number of substeps until the trunk topples; inf if it does not."""
     slid: np.ndarray
     """(start,) distance that the lowest points of all feet slid in contact [mm]."""
     contacts: np.ndarray
@@ -109,8 +99,7 @@ class OutcomesSoFar:
         self._walked, self._commanded, self._depth = np.zeros((3, size))
         upright, (slid, contacts, saturated, shown) = np.ones(size), np.zeros((4, size))
         misses = np.zeros((size, lengths.tracking_bins + 1), dtype=np.uint32)
-        clearance, toppled = np.full((2, size), np.inf)
-        self._sums = _Sums(clearance, upright, toppled, slid, contacts, saturated, shown, misses)
+        self._sums = _Sums(np.full(size, np.inf), upright, slid, contacts, saturated, shown, misses)
         self._before = np.zeros((size, compiled.model.nq)), np.zeros((size, compiled.model.nsensordata))
         columns, ground = compiled.columns, -settled.conditions.standing_height
         self._body = columns.foot.start, columns.touch.start, *compiled.trunk_corners, 0.999 * compiled.torque_limits
@@ -162,7 +151,6 @@ class OutcomesSoFar:
             grounded_loss=self._grounded_loss,
             carried_loss=self._carried_loss,
             fall=self._fall,
-            topple=sums.toppled / self._settled.substeps * self._settled.stride.dt,
             fall_part=self._fall_part,
             clearance=sums.clearance,
             tilt=np.arccos(np.clip(sums.upright, -1.0, 1.0)),
@@ -325,8 +313,6 @@ def _scan(chunk: Any, since: Any, ids: Any, body: Any, rolling: Any, scale: Any,
             _, _, _, _, _, _, _, _, up_z = matrix(q[3], q[4], q[5], q[6])
             sums.clearance[start] = min(sums.clearance[start], lowest(q, corner, radius))
             sums.upright[start] = min(sums.upright[start], up_z)
-            if up_z < LEAST_UPRIGHT:
-                sums.toppled[start] = min(sums.toppled[start], sums.shown[start])
             for leg in range(6):
                 if slides and sensed[touch + leg] > 0 and before[touch + leg] > 0:
                     f = feet + 3 * leg
