@@ -193,16 +193,21 @@ class CompareOptions:
 
 
 class Compare(StudyCommand):
-    """Compare the kinematic, grounded, carried and physical FLSS of controllers on the same starts. Write a table, a
-    figure, NetCDF, a manifest and a gait video. Several values of a condition, as in `--vp 40 80`, are an axis of the
-    result. Repeat the command to resume a stopped run."""
+    """Compare how often controllers lose static and dynamic stability, in the plan and in the simulation, and fall, on
+    the same starts. Write a table, a figure, NetCDF, a manifest and a gait video. Several values of a condition, as in
+    `--vp 40 80`, are an axis of the result. Repeat the command to resume a stopped run."""
 
     study = "measures.compare:Comparison"
     own = (CompareOptions,)
     defaults = {"controller": ("ldvs", "uncoordinated")}  # noqa: RUF012
     data = "comparison.nc"
     figures = {"comparison": "comparison"}  # noqa: RUF012
-    examples = ("", "--controller hws wilson --velocity 0.5 --starts 20 --no-video")
+    examples = ("--precision 0.05", "--controller hws wilson --velocity 0.5 --starts 20 --no-video")
+
+    def build(self, given: SimpleNamespace) -> Any:
+        if given.precision is not None:
+            no_effect(given, ["starts"], "with --precision", {"starts": 60})
+        return super().build(given)
 
     def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
         """Write a recording and a video of the first controller, at the first value of each axis and near V = 0.3, from
