@@ -34,7 +34,7 @@ def test_results_say_what_they_are_in_a_line(walked: hexmj.PhysicalWalk, found: 
     assert repr(walked.planned) == "PlannedWalk(600 steps to t = 60 time units, 3 starts, V = 0.3 to 0.6)"
     assert repr(walked.measured).startswith("Walk(600 steps")
     assert repr(walked).startswith("PhysicalWalk(600 steps to t = 60 time units, 3 starts, V = 0.3 to 0.6; Outcomes(")
-    assert f"fell {fell}, " in repr(walked.outcomes)
+    assert f"fell {fell}" in repr(walked.outcomes)
     assert re.match(r"Gait\(of 3: periodic \d, stable \d", repr(found))
     for one in (walked, walked.planned, walked.measured, walked.outcomes, found):
         assert len(repr(one)) < 200
