@@ -44,7 +44,7 @@ class League(StudyCommand):
     study = "studies.league:League"
     own = (LeagueOptions,)
     planning = ()
-    hidden = ("periods", "accelerating")
+    hidden = ("periods",)
     data = "league.nc"
     figures = {"league": "league", "league_walks": "walks", "prediction": "prediction"}  # noqa: RUF012
     examples = ("--quick", "--controller ldvs mine.py:Mine --velocity 0.5 --no-video")

@@ -18,17 +18,11 @@ from hexmj.studies.disturbed_walks import Case
 from hexmj.studies.league_cells import EntrantWalks
 from hexmj.studies.standings import LEGS_LOST, READING, TRIALS, standings
 from hexmj.sweep import Cell
-from hexmj.timing import Acceleration, observation_duration
+from hexmj.timing import observation_duration
 from hexmj.validate import whole
 
 if TYPE_CHECKING:
     import xarray as xr
-
-RANGE = (0.1, 0.5)
-"""Range of velocities V_r over which J_N of Eq. 10 is measured."""
-
-FINAL = 0.9
-"""Velocity V_r to which kinematic walks accelerate by Eq. 11."""
 
 KINEMATIC_COST = 0.015
 """Computing time of a time unit of a kinematic walk, as a fraction of that of a physical walk."""
@@ -71,13 +65,11 @@ class League(Study):
     """Velocity V_r of the trials."""
     periods: int = 40
     """Number of cycles that every leg walks until its steady-state gait is measured."""
-    accelerating: bool = True
-    """Whether to add kinematic walks that accelerate to V_r = 0.9; they take half of the kinematic computing time."""
     observation_time: str | float = "walk"
     """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
 
     protocol: Begins = "random"
-    """Where kinematic and physical walks at constant V begin: at 'random' starts, or in the 'steady' state that the
+    """Where kinematic and physical walks begin: at 'random' starts, or in the 'steady' state that the
     plan reaches from them in ten periods of a leg. Accelerating walks and trials do not change."""
 
     n_starts: int = field(default=1000, kw_only=True)
@@ -105,16 +97,15 @@ class League(Study):
         """Return the cells of all entrants; raise InputError if an entrant refuses a velocity."""
         from hexmj.physics.settle import check_adhesion
 
-        more = self.trial_velocity, RANGE[1], *([FINAL] if self.accelerating else [])
         for controller in self.controllers.values():
-            check_velocities(controller, (*self.observed[0].tolist(), *more), self.stride)
+            check_velocities(controller, (*self.observed[0].tolist(), self.trial_velocity), self.stride)
         for load in (self.conditions.load, LOAD):
             check_adhesion(replace(self.conditions, load=load), self.stride, self.seed)
         return [*self.named_cells().values()]
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
         """Return the dataset from which tables, figures and ranks are made, see `standings.standings`."""
-        own = {name: getattr(self, name) for name in ("velocities", "trial_velocity", "accelerating", "periods")}
+        own = {name: getattr(self, name) for name in ("velocities", "trial_velocity", "periods")}
         own |= {name: min(getattr(self, name), self.n_starts) for name in ("physical_starts", "trial_starts")}
         found = dict(zip(self.named_cells(), data, strict=True))
         return self.labelled(standings(self.controllers, self.observed[0], found), "league", **own)
@@ -142,14 +133,6 @@ class League(Study):
             yield cell(f"physics {v}", time, "outcomes", begun | physics)
             few = at | {"n_starts": min(every, MOST_GAIT_STARTS)}
             yield cell(f"gait {v}", 25 * time * KINEMATIC_COST, "gaits", few, periods=self.periods)
-        low, high = RANGE
-        own = {"low": low, "high": high, "observation_time": self.observation_time}
-        yield cell("range", 600 * KINEMATIC_COST, "losses_over_range", {"velocity": low}, **own)
-        if self.accelerating:
-            eq11 = Acceleration()
-            time = self._time(FINAL) + eq11.duration(FINAL)
-            speeding = {"velocity": FINAL, "duration": time, "acceleration": eq11}
-            yield cell("accelerated", 6_000 * KINEMATIC_COST, "losses", speeding)
         for trial, leg in LEGS_LOST.items():
             yield cell(f"kinematic, {trial}", 200 * KINEMATIC_COST, "losses", {"controller": LegLost(controller, leg)})
         pushes = can_push(self.conditions, self.stride, tried)

@@ -18,7 +18,7 @@ from hexmj.measures.tables import WalkSettings, happened, over_start
 from hexmj.phases import CONTRALATERAL, IPSILATERAL, circular_mean
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import Case, StableWalks, TooFewStable
-from hexmj.timing import observation_duration, steps_within
+from hexmj.timing import steps_within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,15 +62,6 @@ class EntrantWalks(WalkSettings):
         """Return `lost`: 1 for each start that loses static stability in its planned walk, else 0."""
         how: Any = {"stride": self.stride, "acceleration": self.acceleration, "threads": threads}
         time = first_loss(self.starts, self.controller, self.velocity, self.duration, **how)
-        return over_start({"lost": np.isfinite(time).astype(np.int8)})
-
-    def losses_over_range(
-        self, low: float, high: float, observation_time: str | float, threads: int | None = None
-    ) -> "xr.Dataset":
-        """Return `lost` as `losses` does, with a random velocity from `low` to `high` for each start (Eq. 10)."""
-        velocity = np.random.default_rng([self.seed, 1]).uniform(low, high, self.n_starts)
-        duration = observation_duration(observation_time, velocity, self.stride)
-        time = first_loss(self.starts, self.controller, velocity, duration, stride=self.stride, threads=threads)
         return over_start({"lost": np.isfinite(time).astype(np.int8)})
 
     def gaits(self, periods: int, threads: int | None = None) -> "xr.Dataset":

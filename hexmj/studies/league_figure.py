@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hexmj.measures.figures import caption, starts_in_words
-from hexmj.plotting import FEWER, LEGEND, MEASURE_STYLES, NOTHING, head, heat_map, in_figure, interval, picture, tidy
+from hexmj.plotting import FEWER, LEGEND, MEASURE_STYLES, NOTHING, head, heat_map, in_figure, picture, tidy
 from hexmj.studies.standings import ABOUT_TRIALS, MEASURES, by_rank, place
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
@@ -22,11 +21,6 @@ NOTES = (
     f"in brackets: rank by falls (=: shared); {FEWER} fewer starts, others diverged or out of reach; {NOTHING} unknown"
 )
 """Explanation of the marks in the cells of the heat maps."""
-
-KINEMATIC = MEASURE_STYLES["kinematic"]["color"]
-POINTS = {"range": ("o", KINEMATIC, -0.14), "accelerated": ("D", "white", 0.14)}
-"""FLSS that is not given per velocity -> marker, its fill, and vertical shift of its point in the entrant's row."""
-
 
 NAMED = 0.08
 """Difference between FLDS and frequency of falls beyond which `prediction_figure` names an entrant."""
@@ -52,9 +46,8 @@ def league_figure(result: "xr.Dataset") -> "Figure":
         panels.append(Panel(f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer, SHARE))
     first = shown.entrant.values[shown.best.sel(measure="physical").values == 1]
     finding = f"fewest falls over all velocities: {', '.join(first[:4])}" + " and others" * (len(first) > 4)
-    figure, axes, images = _drawn(finding, shown, panels, beside=1)
-    figure.colorbar(images[0], ax=axes[:-1], location="bottom", label="share of the starts", fraction=0.03, aspect=80)
-    _dots(axes[-1], shown)
+    figure, axes, images = _drawn(finding, shown, panels)
+    figure.colorbar(images[0], ax=axes, location="bottom", label="share of the starts", fraction=0.03, aspect=80)
     return figure
 
 
@@ -111,12 +104,12 @@ def prediction_figure(result: "xr.Dataset") -> "Figure":
 
 
 def _drawn(
-    finding: str, shown: "xr.Dataset", panels: list[Panel], note: str = "", beside: int = 0
+    finding: str, shown: "xr.Dataset", panels: list[Panel], note: str = ""
 ) -> "tuple[Figure, Any, list[AxesImage]]":
-    """Draw panels with a row for each entrant, and leave `beside` more axes empty; return figure, axes, heat maps."""
+    """Draw panels with a row for each entrant; return figure, axes, heat maps."""
     rows, images = shown.sizes["entrant"], []
     figure = picture(10.0, 2.6 + 0.18 * rows)
-    axes = figure.subplots(1, len(panels) + beside, sharey=True)
+    axes = figure.subplots(1, len(panels), sharey=True)
     for ax, (title, values, colours, fewer, ends) in zip(axes, panels, strict=False):
         marks = np.where(np.isfinite(values), np.where(fewer, FEWER, ""), NOTHING)
         images.append(heat_map(ax, shown.velocity.values, values, marks, cmap=colours, **ends))
@@ -128,18 +121,3 @@ def _drawn(
     head(figure, finding, caption(shown))
     figure.supxlabel("\n".join(wrap("; ".join(filter(None, [NOTES, note])), 140)), fontsize=9)
     return figure, axes, images
-
-
-def _dots(axes: "Axes", shown: "xr.Dataset") -> None:
-    """Draw J_N and the FLSS of accelerating walks with their 95 % intervals."""
-    for name, (marker, fill, beside) in POINTS.items():
-        middle, ends = interval(shown, name)
-        style: dict[str, Any] = {"color": KINEMATIC, "fmt": marker, "mfc": fill, "markersize": 4, "capsize": 2.0}
-        axes.errorbar(middle, np.arange(len(middle)) + beside, xerr=ends, **style)
-    for row in range(shown.sizes["entrant"]):
-        axes.axhline(row, color="0.93", linewidth=0.8, zorder=0)
-    axes.set(xlim=(-0.03, 1.03), xticks=(0, 0.5, 1))
-    axes.set_title("kinematic FLSS of\nchanging velocities", fontsize=9)
-    axes.set_xlabel("\N{BLACK CIRCLE} $J_N$: V from 0.1 to 0.5\n\N{WHITE DIAMOND} accelerated to 0.9", fontsize=9)
-    axes.tick_params(labelsize=9, left=False)
-    axes.spines[["top", "right", "left"]].set_visible(False)

@@ -61,8 +61,8 @@ def standings(
         of walks that failed, `missing`. For steady-state gaits: the fractions of starts that are `periodic` and
         `stable`, the median time until it is `reached` [time units], `duty_factor` and the phases `ipsilateral` and
         `contralateral`.
-        Over entrant: `range`, J_N, and `accelerated`, with intervals. Over (entrant, measure): `best` and `worst`
-        rank by the mean over velocities. Over (entrant, trial): `fell`, and kinematic `lost`, with intervals.
+        Over (entrant, measure): `best` and `worst` rank by the mean over velocities. Over (entrant, trial): `fell`,
+        and kinematic `lost`, with intervals.
         The number of starts behind a frequency has the suffix `_starts`.
     """
     import xarray as xr
@@ -91,8 +91,6 @@ def standings(
         places.append(ranks(values.mean(axis=1)))
     best, worst = np.transpose(places, (1, 2, 0))
     table |= {"best": (("entrant", "measure"), best), "worst": (("entrant", "measure"), worst)}
-    for question in ("range", "accelerated"):
-        table |= frequencies(question, cells([question]).lost.values[:, 0], OVER_VELOCITY[:1])
     over_trials = "entrant", "trial"
     table |= frequencies("fell", cells(TRIALS, "trial").fell.values, over_trials)
     table |= frequencies("lost", cells([f"kinematic, {trial}" for trial in TRIALS], "trial").lost.values, over_trials)
@@ -202,8 +200,7 @@ def _ranks(shown: "xr.Dataset") -> Table:
 
     def row(entrant: "xr.Dataset") -> Iterable[str]:
         means = (_known(f"{entrant[measure].mean(skipna=False).item():.3f}") for measure in MEASURES)
-        places = (mean + place(entrant.sel(measure=measure)) for measure, mean in zip(MEASURES, means, strict=True))
-        return *places, frequency(entrant, "range"), frequency(entrant, "accelerated")
+        return (mean + place(entrant.sel(measure=measure)) for measure, mean in zip(MEASURES, means, strict=True))
 
     rows = []
     for (name, *cells), missing in zip(_rows(shown, row), shown.missing.sum("velocity"), strict=True):
@@ -211,7 +208,7 @@ def _ranks(shown: "xr.Dataset") -> Table:
         lost = f" (walks missing: {missing.item():g})" if missing else ""
         rows.append((name + rules + lost, *cells))
     title = "Standings: means over the velocities, and ranks where intervals separate them; = is a tie"
-    return Table(title, ("controller", *MEASURES, "J_N, 0.1 to 0.5", "accelerated to 0.9"), rows)
+    return Table(title, ("controller", *MEASURES), rows)
 
 
 def place(cell: "xr.Dataset") -> str:
