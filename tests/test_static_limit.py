@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexmj import LDVS, Conditions, draw_starts, load_controller, physical_walk
+from hexmj import LDVS, Conditions, draw_starts, load_controller, physical_walk, walk_margin
 from hexmj.body import STICK_INSECT
 from hexmj.studies.static_limit import StaticLimit, distances
 from hexmj.sweep import run_study
@@ -25,10 +25,7 @@ def slower(tmp_path_factory):
 def test_slow_walks_tend_to_their_plan_and_to_the_static_criterion(slower):
     _, result = slower
     fast, slow = result.sel(vp=400.0), result.sel(vp=25.0)
-    assert (slow.margin_carried.mean("start") < 0.25 * fast.margin_carried.mean("start")).all()
-    assert (slow.margin_same_feet.mean("start") < fast.margin_same_feet.mean("start")).all()
-    assert (result.same_feet_carried.mean("start").diff("vp") > 0).all()
-    assert (slow.same_feet_carried.mean("start") > 0.9).all()
+    assert (slow.margin.mean("start") < 0.25 * fast.margin.mean("start")).all()
     assert (slow.agreement >= fast.agreement).all()
     assert (abs(slow.physical - slow.kinematic) < abs(fast.physical - fast.kinematic)).all()
     assert (fast.physical < slow.physical / 2).all()  # dynamics saves fast walks
@@ -43,15 +40,6 @@ def test_the_feet_at_the_ground_give_the_planned_answer_where_those_that_carry_d
     assert (slow.carried > slow.kinematic).all()
     assert (slow.agreement_grounded == 1.0).all()
     assert (result.agreement_grounded > result.agreement_carried).sel(vp=[100.0, 25.0]).all()
-    assert (result.same_feet_grounded.mean("start") >= result.same_feet_carried.mean("start")).all()
-
-
-@pytest.mark.slow
-def test_the_centre_of_pressure_tends_to_the_centre_of_mass(slower):
-    """It strays as feet strike the ground: by about a millimetre at 100 mm/s, by half of that at 25 mm/s."""
-    off = slower[1].margin_pressure.mean("start")
-    assert (off.diff("vp") < 0).all()  # from fast to slow
-    assert (off.sel(vp=25.0) < 0.5 * off.sel(vp=400.0)).all()
 
 
 @pytest.mark.slow
@@ -66,7 +54,7 @@ def test_light_legs_keep_the_centre_of_mass_at_o(slower):
 def test_margins_of_light_and_stiff_legs_are_the_planned_ones():
     """What keeps them apart where the same feet stand: legs that give way, and whose mass moves the centre of mass.
 
-    A servo for half the time step is four times as stiff.  Measured: 0.152 mm, and 0.040 and 0.011 mm with legs of 1 %
+    A servo for half the time step is four times as stiff.  Measured: 0.158 mm, and 0.039 and 0.011 mm with legs of 1 %
     of the mass and servos 4 and 16 times as stiff.
     """
     margins, servo = [], STICK_INSECT.servo
@@ -74,7 +62,9 @@ def test_margins_of_light_and_stiff_legs_are_the_planned_ones():
         body = replace(STICK_INSECT, servo=replace(servo, step=servo.step / finer))
         conditions = replace(Conditions(vp=25.0, leg_mass=leg_mass, longest_substep=longest), body=body)
         walk = physical_walk(draw_starts(8, 0), LDVS, 0.5, 40.0, conditions=conditions)
-        margins.append(distances(walk)["margin_same_feet"].mean())
+        stable = (walk.planned.time[:, None] < walk.outcomes.planned_loss) & np.isfinite(walk.measured.x[..., 0])
+        same = stable & (walk.measured.stance == walk.planned.stance).all(axis=-1)
+        margins.append(abs(walk_margin(walk.measured) - walk_margin(walk.planned))[same].mean())
     assert margins[1] < margins[0] / 3
     assert margins[2] < margins[1] / 3
 
@@ -83,8 +73,8 @@ def test_margins_of_light_and_stiff_legs_are_the_planned_ones():
 def test_with_feedback_the_distance_is_that_from_the_plan_as_commanded():
     walk = physical_walk(draw_starts(6, 0), load_controller("tegotae"), 0.5, 60.0, conditions=Conditions(vp=20.0))
     kinematic = replace(walk, ordered=walk.planned)
-    commanded, planned = (distances(way)["same_feet_carried"].mean() for way in (walk, kinematic))
-    assert commanded > 1.02 * planned
+    commanded, planned = (distances(way)["margin"].mean() for way in (walk, kinematic))
+    assert commanded < planned
 
 
 @pytest.mark.slow
@@ -95,10 +85,10 @@ def test_the_command_writes_its_files_and_tells_the_same_as_text(tmp_path, run):
     answer = json.loads(text)
     assert {path.name for path in tmp_path.iterdir()} == {"converge.nc", "converge.png", "manifest.json", "walks"}
     assert len(list((tmp_path / "walks").iterdir())) == 4
-    assert np.shape(answer["margin_carried"]) == np.shape(answer["agreement"]) == (2, 2)
+    assert np.shape(answer["margin"]) == np.shape(answer["agreement"]) == (2, 2)
     assert answer["settings"]["conditions"]["longest_substep"] == 0.5
     assert not {"vp", "leg_mass"} & set(answer["settings"]["conditions"])
     code, text, _ = run(*words)
     assert code == 0
-    assert f"{answer['margin_grounded'][0][1]:.3f}" in text
+    assert f"{answer['margin'][0][1]:.3f}" in text
     assert "vp 80" not in text

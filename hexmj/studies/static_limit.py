@@ -19,11 +19,11 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.measures.compare import MEASURES, with_flss
 from hexmj.measures.figures import caption
-from hexmj.measures.study import Study, kept_walk
+from hexmj.measures.study import UNITS, Study, kept_walk
 from hexmj.measures.tables import WalkSettings, over_start
 from hexmj.plotting import LEGEND, MEASURE_STYLES, frequency_curve, head, picture, tidy
 from hexmj.progress import Progress
-from hexmj.stability import loss_time, stability_margin, walk_margin
+from hexmj.stability import loss_time, walk_margin
 from hexmj.sweep import Cell, over_axes
 from hexmj.timing import Acceleration
 
@@ -34,27 +34,15 @@ if TYPE_CHECKING:
     from hexmj.measures.physical import PhysicalWalk
 
 DISTANCES = {
-    "margin_grounded": ("mm", "mean distance between margin of the feet at the ground and planned margin"),
-    "margin_carried": ("mm", "mean distance between margin of the feet that carry load and planned margin"),
-    "margin_pressure": ("mm", "mean distance between margin of the centre of pressure and planned margin"),
-    "margin_same_feet": ("mm", "`margin_carried` while the planned feet carry load"),
-    "same_feet_grounded": ("1", "fraction of steps in which the planned feet are the feet at the ground"),
-    "same_feet_carried": ("1", "fraction of steps in which the planned feet are those that carry load"),
+    "margin": ("mm", "mean distance between margin of the feet at the ground and planned margin"),
     "drift": ("mm", "mean distance of the centre of mass from O"),
 }
 """Distance of a simulated walk from its plan -> unit, long name. Walks count until the plan's loss or the fall."""
 
-REPORTED = {"slip": "mm/s", "tracking": "mm"}
-"""Field of `Outcomes` that the result contains too -> its unit."""
-
 FINE = Conditions(longest_substep=0.5)
 """Default conditions: light legs need physics steps of at most 0.5 ms."""
 
-STYLES: dict[str, dict[str, Any]] = MEASURE_STYLES | {
-    "pressure": {"color": "0.55", "marker": "v", "label": "centre of pressure"},
-    "same_feet": {"color": "#8fce8a", "marker": "D", "label": "carried, while the planned feet carry load"},
-    "drift": {"color": "0.15", "marker": "o"},
-}
+STYLES: dict[str, dict[str, Any]] = MEASURE_STYLES | {"drift": {"color": "0.15", "marker": "o"}}
 """Curve -> its style."""
 
 PANELS = {
@@ -64,12 +52,7 @@ PANELS = {
         "agreement_carried": "carried",
         "agreement": "physical",
     },
-    "distance from the planned margin [mm]": {
-        "margin_pressure": "pressure",
-        "margin_grounded": "grounded",
-        "margin_carried": "carried",
-        "margin_same_feet": "same_feet",
-    },
+    "distance from the planned margin [mm]": {"margin": "grounded"},
     "centre of mass from O [mm]": {"drift": "drift"},
 }
 """Label of a panel's axis -> the variables drawn in the panel, and their styles."""
@@ -117,8 +100,8 @@ class StaticLimit(Study):
         Returns:
             Over (leg_mass, vp): the FLSS of `MEASURES` with 95 % Wilson intervals; `agreement`, the fraction of starts
             with a planned loss and a fall, or with neither; `agreement_grounded` and `agreement_carried`, the same for
-            these losses instead of the fall. Over (leg_mass, vp, start): the times of the losses and falls,
-            `DISTANCES` and `REPORTED`.
+            these losses instead of the fall. Over (leg_mass, vp, start): the times of the losses and falls, and
+            `DISTANCES`.
         """
         mass = {"units": "1", "long_name": "mass of the legs over the insect's own"}
         table = over_axes({"leg_mass": len(self.leg_masses), "vp": len(self.vps)}, data).assign_coords(
@@ -134,10 +117,9 @@ class StaticLimit(Study):
 
 
 def distance_table(walks: WalkSettings, threads: int | None = None, progress: Progress | None = None) -> "xr.Dataset":
-    """Compute a cell of the study: the outcomes of `MEASURES`, `DISTANCES` and `REPORTED` over start."""
+    """Compute a cell of the study: the outcomes of `MEASURES` and the `DISTANCES` over start."""
     walk = kept_walk(walks, walks.starts, threads=threads, progress=progress)
-    units = dict.fromkeys(MEASURES.values(), "time unit") | REPORTED
-    table = over_start({name: getattr(walk.outcomes, name) for name in units}, units)
+    table = over_start({name: getattr(walk.outcomes, name) for name in MEASURES.values()}, UNITS)
     for name, values in distances(walk).items():
         table[name] = ("start", values, dict(zip(("units", "long_name"), DISTANCES[name], strict=True)))
     return table
@@ -148,48 +130,19 @@ def distances(walk: "PhysicalWalk") -> dict[str, np.ndarray]:
 
     With sensory feedback, the distances are measured from the plan that the legs followed.
     """
-    plan, seen = walk.ordered, {"grounded": walk.grounded, "carried": walk.measured}
+    plan, seen = walk.ordered, walk.grounded
     compared = plan.time[:, None] < np.minimum(loss_time(plan), walk.outcomes.fall)
-    planned, pressure = walk_margin(plan), pressure_margin(walk)
-    same = {name: (feet.stance == plan.stance).all(axis=-1) for name, feet in seen.items()}
     drift = np.linalg.norm(walk.centre_of_mass[..., :2] - walk.qpos[..., :2], axis=-1)
-    stands = {name: compared & feet.stance.any(axis=-1) for name, feet in seen.items()}  # else there is no margin
     with np.errstate(invalid="ignore"):
-        off = {name: np.abs(walk_margin(feet) - planned) for name, feet in seen.items()}
-        steps = {f"margin_{name}": (values, stands[name]) for name, values in off.items()}
-        steps |= {f"same_feet_{name}": (alike, compared) for name, alike in same.items()}
-        steps |= {  # values, and the steps that count, both (step, start)
-            "margin_pressure": (np.abs(pressure - planned), compared & np.isfinite(pressure)),
-            "margin_same_feet": (off["carried"], stands["carried"] & same["carried"]),
+        apart = np.abs(walk_margin(seen) - walk_margin(plan))
+        steps = {  # values, and the steps that count, both (step, start); without a foot there is no margin
+            "margin": (apart, compared & seen.stance.any(axis=-1)),
             "drift": (drift, compared),
         }
         return {
             name: np.where(counts, values, 0.0).sum(axis=0) / counts.sum(axis=0)
             for name, (values, counts) in steps.items()
         }
-
-
-def centre_of_pressure(walk: "PhysicalWalk") -> np.ndarray:
-    """Return the centre of pressure of the feet relative to the centre of mass, (step, start, 2) [mm].
-
-    Feet that adhesion pulls down are left out. NaN where the ground pushes no foot up.
-    """
-    pushed = np.maximum(walk.load, 0.0)
-    with np.errstate(invalid="ignore"):
-        share = pushed / pushed.sum(axis=-1, keepdims=True)
-    return (share[..., None] * walk.measured.feet).sum(axis=-2)
-
-
-def pressure_margin(walk: "PhysicalWalk") -> np.ndarray:
-    """Return the distance of the centre of pressure from the nearest edge of the support polygon, (step, start) [mm].
-
-    The polygon is that of the feet at the ground. The centre of pressure is never outside, and when the body tips over
-    an edge, it is on that edge. NaN where the ground pushes no foot up.
-    """
-    support, centre = walk.grounded, centre_of_pressure(walk)
-    known = np.isfinite(centre[..., 0])
-    feet = np.where(known[..., None, None], support.feet - centre[..., None, :], 0.0)
-    return np.where(known, np.abs(stability_margin(feet, support.stance & known[..., None])), np.nan)
 
 
 def static_limit_figure(result: "xr.Dataset") -> "Figure":
@@ -199,7 +152,10 @@ def static_limit_figure(result: "xr.Dataset") -> "Figure":
     figure, result = picture(10.0, 7.4), result.sortby("vp")
     panels, masses, vps = figure.subplots(2, 2, sharex=True).ravel(), result.leg_mass.values, result.vp.values
     lines = ("-", "--", ":", "-.") * len(masses)
-    alone, style = result.isel(leg_mass=0, vp=0), STYLES["kinematic"] | {"marker": None}  # kinematic FLSS has one value
+    alone, style = (
+        result.isel(leg_mass=0, vp=0),
+        STYLES["kinematic"] | {"marker": None},
+    )  # kinematic FLSS has one value
     panels[0].axhspan(alone.kinematic_low.item(), alone.kinematic_high.item(), alpha=0.15, color=style["color"], lw=0)
     handles = {"kinematic": panels[0].axhline(alone.kinematic.item(), **style)}
     for axes, (title, curves) in zip(panels, PANELS.items(), strict=True):
