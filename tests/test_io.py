@@ -29,16 +29,6 @@ def test_a_result_stays_what_it_is(tmp_path: Path, controller) -> None:
     assert hexmj.settings(again)["seed"] == 2**70
 
 
-def test_settings_are_those_that_were_given() -> None:
-    conditions, slow = hexmj.Conditions(vp=200.0, friction=0.5), hexmj.Acceleration(rate=0.02)
-    how = {"n_starts": 2, "observation_time": 20.0, "conditions": conditions, "acceleration": slow}
-    made = hexmj.settings(hexmj.compare({"ß: 1 $": hexmj.LDVS, "null": hexmj.HWS}, [0.3], **how))
-    assert [*made["controllers"]] == ["ß: 1 $", "null"]
-    assert made["conditions"] == conditions.settings()
-    assert made["acceleration"] == {"rate": 0.02, "start": 0.1}
-    assert (made["study"], made["observation_time"], made["starts"], made["seed"]) == ("compare", 20.0, 2, 0)
-
-
 @pytest.mark.parametrize("content", [None, b"", b"CDF\x01", b"no NetCDF", "cut"])
 def test_files_that_are_no_netcdf_are_refused(tmp_path: Path, content) -> None:
     path = write_netcdf(odd_bits(1), tmp_path / "a.nc")

@@ -144,25 +144,6 @@ def test_a_range_may_begin_at_a_stand():
     assert flss_over_range(UNCOORDINATED, 0.0, 0.0, n_starts=20, observation_time=10.0)[0] == 0.0
 
 
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        ("velocities", {"velocities": []}),
-        ("velocities", {"velocities": [0.1, 0.1]}),
-        ("velocity", {"velocities": [1.0]}),
-        ("velocity", {"velocities": [0.0]}),
-        ("observation_time", {"observation_time": "long"}),
-        ("n_starts", {"n_starts": 0}),
-        ("seed", {"seed": -1}),
-        ("threads", {"threads": 0}),
-        ("controller", {"controller": "ldvs"}),
-    ],
-)
-def test_invalid_arguments_of_flss_are_refused(name, change):
-    with pytest.raises(InputError, match=name):
-        flss(**{"controller": LDVS, "velocities": [0.5], "n_starts": 10} | change)
-
-
 @pytest.mark.parametrize("change", [{"seed": -1}, {"low": -0.5}, {"high": 0.05}, {"high": 1.0}, {"low": 0.0}])
 def test_invalid_arguments_of_flss_over_range_are_refused(change):
     with pytest.raises(InputError):

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hexmj.conditions import Conditions
-from hexmj.physics.outcomes import _count_misses, _percentile, _scan, _Sums
+from hexmj.physics.outcomes import _count_misses, _percentile
 from hexmj.physics.rollout import Senses
 from hexmj.physics.settle import settle
 from hexmj.starts import draw_starts
@@ -98,28 +98,3 @@ def test_a_miss_is_counted_once_in_its_bin(distance, place):
 def test_a_percentile_is_the_end_of_the_bin_that_holds_it():
     counts = np.array([[19, 1, 0], [18, 2, 0], [0, 0, 3], [0, 0, 0]])
     assert_allclose(_percentile(counts, 0.95, 0.25), [0.25, 0.5, np.inf, np.nan])
-
-
-def test_what_a_chunk_adds_up_to():
-    """One start, three substeps, two joints, a trunk of one sphere: every sum is had by hand."""
-    qpos = np.tile(np.array([0.0, 0.0, 9.0, *STILL]), (1, 3, 1))
-    qpos[0, 1:, 2], qpos[0, 2, 3:7] = (8.0, 7.0), (np.cos(0.1), np.sin(0.1), 0.0, 0.0)
-    seen = np.zeros((1, 3, 24))
-    seen[0, :, 18:24] = [[0.5, 0.5, 0, 0, 0, 0], [0.5, 0, 0, 0, 0, 0], [0.5, 0.5, 0, 0, 0, 0.5]]
-    seen[0, 1, :2], seen[0, 2, :2] = (3.0, 4.0), (3.0, 5.0)
-    seen[0, 1, 3:5] = 100.0
-    force = np.array([[[1.0, -2.0], [0.9, 1.9], [-1.0, 0.0]]])
-    slid, contacts, saturated, shown = np.zeros((4, 2))
-    misses = np.zeros((2, 4), dtype=np.uint32)
-    sums = _Sums(np.full(2, np.inf), np.ones(2), slid, contacts, saturated, shown, misses)
-    body = 0, 18, np.array([[0.0, 2.0, -1.0]]), np.array([0.5]), np.array([1.0, 2.0])
-    targets = np.zeros((1, 3, 6, 3))
-    since, rolling = ((np.zeros((2, 7)), np.zeros((2, 24))), 0, 4, 4), (np.zeros((6, 0, 3)), np.zeros((6, 0)), 0.5)
-    _scan((qpos, seen, targets, force, np.array([3])), since, np.array([1]), body, rolling, (-12.0, 0.25), sums)
-    assert_allclose(sums.upright, [1.0, np.cos(0.2)])
-    assert_allclose(sums.clearance, [np.inf, 7.0 + 2.0 * np.sin(0.2) - np.cos(0.2) - 0.5])
-    assert_allclose(sums.slid, [0.0, 5.0 + 1.0 + 2 * 0.5 * np.sin(0.1)])
-    assert np.array_equal(sums.contacts, [0.0, 2.0])
-    assert np.array_equal(sums.saturated, [0.0, 3.0])
-    assert np.array_equal(sums.shown, [0.0, 3.0])
-    assert not sums.misses.any()

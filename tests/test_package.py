@@ -29,7 +29,3 @@ def test_public_ci_calls_the_same_script_on_all_pythons():
     assert any(step.get("run", "").endswith(".ci/run") for step in job["steps"])
     pythons = [f"Programming Language :: Python :: {version}" for version in job["strategy"]["matrix"]["python"]]
     assert set(pythons) < set(PROJECT["classifiers"])
-
-
-def test_the_package_is_typed():
-    assert Path(hexmj.__file__).with_name("py.typed").exists()

@@ -17,9 +17,6 @@ from hexmj.timing import Acceleration, Stride, check_reached, observation_durati
 if TYPE_CHECKING:
     import xarray as xr
 
-FRESH = 17
-"""Seed of starts on which no preset was optimised."""
-
 VELOCITY = {"units": "V_p", "long_name": "velocity V_r"}
 """Attributes of the coordinate `velocity`."""
 

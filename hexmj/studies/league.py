@@ -12,7 +12,6 @@ from hexmj.controllers.wrappers import Begins, LegLost, PoorSenses, by_protocol
 from hexmj.errors import InputError
 from hexmj.gaits import CYCLES
 from hexmj.measures.study import GROUND, Study
-from hexmj.measures.tables import FRESH
 from hexmj.starts import draw_starts
 from hexmj.studies.disturbed_walks import Case
 from hexmj.studies.league_cells import EntrantWalks
@@ -74,8 +73,8 @@ class League(Study):
 
     n_starts: int = field(default=1000, kw_only=True)
     """Number of random starts in kinematic walks, the same for every controller and velocity."""
-    seed: int = field(default=FRESH, kw_only=True)
-    """Seed of the random starts."""
+    seed: int = field(default=17, kw_only=True)
+    """Seed of the random starts; by default one on which no preset was optimised."""
 
     hidden: ClassVar[tuple[str, ...]] = ("load", *GROUND)
 
