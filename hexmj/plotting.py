@@ -22,7 +22,6 @@ FIGURES: dict[str, dict[str, str]] = {
     "flss": {"flss": "measures.figures:flss_figure"},
     "compare": {"comparison": "measures.figures:comparison_figure"},
     "map": {"map": "studies.stability_map:map_figure", "mechanisms": "studies.stability_map:mechanisms_figure"},
-    "converge": {"converge": "studies.static_limit:static_limit_figure"},
     "terrain": {"terrain": "studies.terrain:terrain_figure"},
     "disturb": {"disturb": "studies.disturbance:disturbed_figure"},
     "biology": {"biology": "studies.biology:biology_figure"},

@@ -355,7 +355,6 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "disturb": "disturb --velocity 0.5 --starts 2 --observation-time 40 --impulses 5 --dt 0.5 --vp 200",
     "disturb kinematic": "disturb --kinematic --velocity 0.7 --starts 8 --observation-time 40",
     "terrain": "terrain --velocity 0.8 --starts 2 --grounds step gap rough --lengths 10 --grasps 0 1 --dt 0.5",
-    "converge": "converge --velocity 0.7 --vps 200 80 --starts 4 --observation-time start",
     "biology": "biology --starts 1 --periods 4",
     "reproduce claims": "reproduce --quick --only hws-close ideal-0.4 p4 --beside lasting",
     "reproduce figures": reproduce,

@@ -110,15 +110,6 @@ def mapped(seed: int) -> Arrays:
     return out
 
 
-def converged(seed: int) -> Arrays:
-    from hexmj.studies.static_limit import StaticLimit
-    from hexmj.sweep import run_study
-
-    return _table(
-        run_study(StaticLimit(hexmj.LDVS, vps=[200.0, 80.0], n_starts=6, observation_time="start", seed=seed))
-    )
-
-
 def searched(seed: int) -> Arrays:
     from hexmj.search.forms import NetworkForm
     from hexmj.search.stages import search
@@ -185,7 +176,7 @@ def reproduced(seed: int) -> Arrays:
 
 SAMPLES: tuple[Callable[[int], Arrays], ...] = (
     kinematic_flss, gaits, compared, compared_with_feedback, other_conditions, disturbed, disturbed_with_feedback,
-    terrain, mapped, converged, searched, recorded, environment, reproduced,
+    terrain, mapped, searched, recorded, environment, reproduced,
 )  # fmt: skip
 
 

@@ -161,7 +161,6 @@ BAD = [
     "map --over vp --vp 40",
     "disturb --disturbances dance",
     "terrain --velocity 0 --grounds step",
-    "converge --vps 80 80",
     "biology --periods 1",
     "league --controller",
     "league --velocity",

@@ -23,7 +23,6 @@ from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.studies.league import League
 from hexmj.studies.league_cells import entrants
 from hexmj.studies.stability_map import StabilityMap
-from hexmj.studies.static_limit import StaticLimit
 from hexmj.studies.terrain import Terrain
 from hexmj.sweep import run_study
 from tiers import few_of
@@ -60,7 +59,6 @@ MADE: dict[str, Callable[[], xr.Dataset]] = {
     "flss": lambda: hexmj.physical_flss(hexmj.LDVS, [0.5, 0.7], **PHYSICAL),
     "compare": compared,
     "map": lambda: run_study(StabilityMap(hexmj.UNCOORDINATED, "vp", [160.0, 320.0], [0.5, 0.7], **PHYSICAL)),
-    "converge": lambda: run_study(StaticLimit(hexmj.LDVS, vps=[320.0, 160.0], **PHYSICAL)),
     "terrain": lambda: run_study(Terrain(hexmj.LDVS, [0.6], ["step", "hurdle"], [3.0], grasps=[0.0], n_starts=2)),
     "disturb": lambda: run_study(DisturbedWalks(hexmj.LDVS, [0.5, 0.6], ["halt", "leg"], **KINEMATIC)),
     "biology": lambda: run_study(Biology(hexmj.LDVS, 4, n_starts=2)),
@@ -104,7 +102,7 @@ def test_the_order_of_the_axes_changes_no_pixel(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "axis"),
     few_of(
-        [("flss", "velocity"), ("compare", "velocity"), ("disturb", "velocity"), ("converge", "vp")],
+        [("flss", "velocity"), ("compare", "velocity"), ("disturb", "velocity")],
         ("flss", "velocity"),
     ),
 )

@@ -15,7 +15,6 @@ from hexmj.studies.biology import Biology
 from hexmj.studies.disturbance import DisturbedWalks
 from hexmj.studies.league import League
 from hexmj.studies.stability_map import StabilityMap
-from hexmj.studies.static_limit import StaticLimit
 from hexmj.studies.terrain import Terrain
 
 
@@ -77,7 +76,7 @@ class Still:
 
 
 LIMITED = Limited()
-FEW: Any = {"n_starts": 2, "physical_starts": 1, "trial_starts": 1, "accelerating": False}
+FEW: Any = {"n_starts": 2, "physical_starts": 1, "trial_starts": 1}
 FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
 
 
@@ -127,8 +126,6 @@ def test_walks_that_accelerate_are_not_refused_before_the_work() -> None:
         ("over", StabilityMap, {"over": "wind"}),
         ("friction", StabilityMap, {"over": "friction", "values": [-1.0]}),
         ("sensory feedback", StabilityMap, {"controller": hexmj.SensoryFeedback(hexmj.LDVS)}),
-        ("leg_mass", StaticLimit, {"leg_masses": ()}),
-        ("vp", StaticLimit, {"conditions": hexmj.Conditions(vp=20.0)}),
         ("disturbances", DisturbedWalks, {"disturbances": ["halt", "halt"]}),
         ("disturbances", DisturbedWalks, {"disturbances": ["push"], "kinematic": True}),
         ("strategies", DisturbedWalks, {"strategies": ["jump"]}),

@@ -32,7 +32,6 @@ Studies
   map               physical FLSS over the velocity and one condition
   disturb           walks with a halt, a stopped leg or a push
   terrain           falls at steps, gaps, hurdles and on rough ground
-  converge          the same starts at decreasing V_p
   biology           forces, gait, posture and work compared with insects
 
 Controllers
@@ -54,7 +53,7 @@ Machine
 MODULES = {
     "measures": ("walk", "flss", "compare"),
     "pictures": ("render", "page", "export", "view"),
-    "studies": ("map", "disturb", "terrain", "converge", "biology"),
+    "studies": ("map", "disturb", "terrain", "biology"),
     "controllers": ("league", "search", "check-controller"),
     "paper": ("reproduce",),
     "machine": ("doctor", "rerun"),

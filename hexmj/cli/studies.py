@@ -1,4 +1,4 @@
-"""`hexmj map`, `hexmj disturb`, `hexmj terrain`, `hexmj converge` and `hexmj biology`."""
+"""`hexmj map`, `hexmj disturb`, `hexmj terrain` and `hexmj biology`."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -13,9 +13,6 @@ from hexmj.cli.output import HEADS, Column, difference, grid, interval, lists_of
 if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
-
-AGREEMENT = {"grounded": "agreement_grounded", "carried": "agreement_carried", "physical": "agreement"}
-"""Heading -> variable: fraction of starts with the same outcome as in the plan."""
 
 
 class Map(StudyCommand):
@@ -151,43 +148,6 @@ class Terrain(StudyCommand):
         yield "grasp: adhesion over the weight; crossed: starts that crossed the obstacle, of those that reached it"
         yield f"parts that touched the ground: {', '.join(f'{part} {n}' for part, n in fell_on) or 'none'}"
         yield f"commanded distance {result.attrs['distance']:g} mm"
-
-
-class Converge(StudyCommand):
-    """Walk the same starts at decreasing V_p, where the body follows its plan more closely and physical stability
-    converges to the static criterion. Repeat the command to resume a stopped run."""
-
-    study = "studies.static_limit:StaticLimit"
-    data = "converge.nc"
-    figures = {"converge": "converge"}  # noqa: RUF012
-    examples = ("--velocity 0.5 --starts 20", "--vps 200 50 --leg-masses 1 --controller hws")
-
-    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        return lists_of(_means(result))
-
-    def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        from hexmj.measures.compare import MEASURES
-
-        means, axes = _means(result), ("leg_mass", "vp")
-        yield (
-            f"V = {study.velocity:g}: FLSS, with 95 % intervals; mass: of the legs, in multiples of the default;"
-            " grounded: feet at the ground; carried: feet that carry load; physical: falls"
-        )
-        yield grid(means, axes, [*MEASURES])
-        yield "Fraction of starts with the same outcome as in the plan"
-        yield grid(means, axes, AGREEMENT)
-        yield (
-            "Mean distances [mm] until the plan loses stability: of the margin of the feet at the ground from that of"
-            " the plan (margin), and of the centre of mass from O (drift)"
-        )
-        yield grid(means, axes, ["margin", "drift"])
-
-
-def _means(result: "xr.Dataset") -> "xr.Dataset":
-    """Return the means over the starts."""
-    from hexmj.measures.compare import MEASURES
-
-    return result.drop_vars(MEASURES.values()).mean("start", keep_attrs=True)
 
 
 class Biology(StudyCommand):
