@@ -35,7 +35,7 @@ FIGURES: dict[str, dict[str, str]] = {
 }
 """Attribute `study` of a result -> its figures: name -> 'module:function' that draws it, modules relative to hexmj."""
 
-CURVE: dict[str, Any] = {"marker": "o", "markersize": 4, "linewidth": 1.6, "capsize": 2.5}
+CURVE: dict[str, Any] = {"marker": "o", "markersize": 5, "linewidth": 1.8, "capsize": 2.5}
 """Style of points with error bars."""
 
 BESIDE = 0.024
@@ -45,7 +45,7 @@ MEASURE_STYLES: dict[str, dict[str, Any]] = {
     "kinematic": {"color": "#1b6ca8", "marker": "o", "linestyle": "-", "label": "kinematic FLSS: planned feet"},
     "dynamic": {"color": "#2b2b2b", "marker": "v", "linestyle": (0, (5, 1)), "label": "FLDS: tipping pendulum"},
     "grounded": {"color": "#c8740a", "marker": "s", "linestyle": "--", "label": "grounded FLSS: feet at the ground"},
-    "carried": {"color": "#2a9d5c", "marker": "D", "linestyle": "--", "label": "carried FLSS: feet that carry load"},
+    "carried": {"color": "#2a9d5c", "marker": "D", "linestyle": ":", "label": "carried FLSS: feet that carry load"},
     "physical": {"color": "#b3261e", "marker": "^", "linestyle": "-.", "label": "frequency of falls: trunk on ground"},
 }
 """Measure -> style and label of its curve; markers and lines differ too, for readers without colours."""

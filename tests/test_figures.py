@@ -194,7 +194,9 @@ def test_a_concatenated_result_names_its_coordinates() -> None:
 def test_the_finding_of_a_comparison_follows_its_walks(lost: float, fell: float, times_found: int) -> None:
     result = xr.concat([made("compare")] * 20, "start", data_vars="minimal")
     times = 0.0 * result.tilt + xr.where(result.velocity == 0.5, 1.0, np.inf)
-    assert head_of(result.assign(planned_loss=times * lost, fall=times * fell)).count("at V = 0.5") == times_found
+    result = result.assign(planned_loss=times * lost, fall=times * fell)
+    assert head_of(result).count("at V = 0.5") == times_found
+    assert "at V = 0.5" not in head_of(result.assign(weight=result.tilt)), "the intervals of 3 starts overlap"
 
 
 def test_a_notebook_shows_a_figure() -> None:
