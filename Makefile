@@ -62,6 +62,10 @@ results: bench
 	    .venv/bin/hexmj compare --controller ldvs --velocity 0.5 --starts 400 --no-video --$$varied \
 	        --out results/sensitivity/$${varied%% *} || exit 1; \
 	done
+	.venv/bin/hexmj compare --controller ldvs --velocity 0.3 0.5 0.7 --vp 20 40 80 160 --starts 400 --seed 66 \
+	    --no-video --out results/dynamic
+	.venv/bin/hexmj compare --controller ldvs --velocity 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 --precision 0.03 \
+	    --no-video --out results/over_v
 	.venv/bin/python docs/results.py
 
 gallery: .venv/project system

@@ -9,7 +9,7 @@ import re
 import shutil
 import sys
 from collections.abc import Sequence
-from itertools import groupby
+from itertools import groupby, product
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -176,6 +176,20 @@ def sensitivity(folder: Path) -> list[str]:
     return [table("option|default|falls|difference", rows)]
 
 
+def dynamic(folder: Path) -> list[str]:
+    """Return FLDS and falls over V and V_p with their agreement start by start, and draw all measures over V."""
+    with as_shipped():
+        io.save_figure(hexmj.plot(io.load(folder.parent / "over_v/comparison.nc")), IMAGES / "dynamic.png")
+    measures, rows = ("kinematic", "dynamic", "physical"), []
+    result = io.load(folder / "comparison.nc").isel(controller=0)
+    for v, vp in product(result.velocity.values, result.vp.values):
+        cell = result.sel(velocity=v, vp=vp)
+        predicted = happened(cell.dynamic_loss), happened(cell.planned_loss)
+        agree = [f"{(lost == happened(cell.fall)).mean().item():.2f}" for lost in predicted]
+        rows.append([f"{v:g}", f"{vp:g}", *(frequency(cell, name) for name in measures), *agree])
+    return [table("V|V_p [mm/s]|kinematic FLSS|FLDS|falls|agreement, FLDS|agreement, FLSS", rows)]
+
+
 def speed(folder: Path) -> list[str]:
     """Return the ratios of `make bench`, without the speeds of the machine."""
     lines = (folder / "table.md").read_text(encoding="utf-8").splitlines()
@@ -189,10 +203,11 @@ def speed(folder: Path) -> list[str]:
 def main() -> None:
     """Write every page whose results are in the folder."""
     results = Path(sys.argv[1] if len(sys.argv) > 1 else "results")
-    files = {paper: "reproduce/claims.json", league: "league/league.nc"}
-    files |= {biology: "biology/biology.nc", speed: "bench/table.md", sensitivity: "sensitivity/vp/comparison.nc"}
+    files = {paper: "reproduce/claims.json", league: "league/league.nc", biology: "biology/biology.nc"}
+    files |= {speed: "bench/table.md", sensitivity: "sensitivity/vp/comparison.nc", dynamic: "dynamic/comparison.nc"}
+    pages = {sensitivity: "concepts/physics.md", dynamic: "concepts/dynamic.md"}
     for write, name in files.items():
-        page = PAGES / ("concepts/physics.md" if write is sensitivity else f"results/{write.__name__}.md")
+        page = PAGES / pages.get(write, f"results/{write.__name__}.md")
         if not (results / name).exists():
             print(f"{page.name} stays: {results / name} does not exist")
             continue
