@@ -316,6 +316,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
         "flss --velocity 0.7 --starts 600 --range-of 200 --observation-time start"
     ),
     "flss physical, resumption, rerun": lambda: resumed(FALLS),
+    "flss dynamic": "flss --measure dynamic --velocity 0.6 --starts 300 --vp 40",
     "flss threads": lambda: same_with("--threads 1", f"{FLSS} 0.5"),
     "flss processes": lambda: same_with("--processes 2", f"{FLSS} 0.3 0.6"),
     "flss scheduler": lambda: scheduler(f"{FLSS} 0.3 0.5"),
@@ -331,6 +332,9 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "controller learned": f"{FALLS} --controller train_cma.py:REFLEXES",
     "check-controller": "check-controller tripod.py:Tripod",
     "check-controller fails": lambda: answer("check-controller broken.py:Broken", code=1),
+    "compare precise": "compare --controller ldvs --velocity 0.7 --precision 0.2 --vp 80 160 --no-video"
+    " --observation-time 20",
+    "compare steady": "compare --controller graham-random --velocity 0.8 --starts 3 --protocol steady --no-video",
     "compare": lambda: resumed(
         "compare --controller hws tripod.py:Tripod --velocity 0.7 --starts 4 --observation-time 40"
     ),
@@ -364,6 +368,7 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "search range": f"{SEARCH} mirrored --velocity 0.3 0.6 --begin hws --ties later",
     "search over variants": f"{SEARCH} hws --velocity 0.5 --over mean",
     "search fields": f"{SEARCH} tripod.py:Tripod --velocity 0.5",
+    "search dynamic": f"{SEARCH.replace('20', '10')} hws --velocity 0.5 --measure dynamic --vp 40",
     "search physical": f"{SEARCH.replace('20', '10')} hws --velocity 0.7 --measure physical --vp 200 --dt 0.5",
     "doctor": lambda: {check["name"]: True for check in json.loads(run_command("doctor --json")[1])["checks"]},
     "errors": lambda: [text("flss --velocity 1.5"), text("walk --controller nothing")],

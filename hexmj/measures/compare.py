@@ -256,9 +256,7 @@ def _falls(result: "xr.Dataset") -> "xr.Dataset":
     """Return the dataset of `physical_flss` from a comparison of one controller."""
     kept = ("physical", "physical_low", "physical_high", "walks", "plain_walks", "weight", "fall", *REPORTED)
     falls = result.isel(controller=0, drop=True)[[name for name in kept if name in result]]
-    falls = falls.rename(physical="flss", physical_low="low", physical_high="high").drop_vars(
-        ["leg", "starts"], errors="ignore"
-    )
+    falls = falls.rename(physical="flss", physical_low="low", physical_high="high").reset_coords("duration")
     return falls.assign_attrs(result.attrs | {"study": "flss"})
 
 
