@@ -161,6 +161,8 @@ def finished_cells(
         InputError: a setting cannot be part of a cache key, or a worker process died. An error of a cell is raised with
             a note that names the cell.
     """
+    if unknown := execution.keys() - Execution.__annotations__:
+        raise TypeError(f"unexpected keyword arguments: {', '.join(sorted(unknown))}")
     executor, progress, threads = (execution.get(name) for name in ("executor", "progress", "threads"))
     done = [0.0] * len(cells)
     paths: list[Path | None] = [None] * len(cells)

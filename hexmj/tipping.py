@@ -1,14 +1,14 @@
 """Dynamic stability: a pendulum on the edge of the support polygon tips over, or the next foot catches it.
 
 While the centre of mass is outside the support polygon, the trunk tips over the nearest edge like an inverted pendulum,
-a point mass at the standing height h.  Its excursion z beyond the edge obeys
+a point mass at the standing height h.  Its excursion z from the planned position, away from the polygon, obeys
 
     z'' = (g / h) (z - m(t)),    z >= 0,
 
 where m(t) is the stability margin, negative outside the polygon.  The pendulum is at rest, z = z' = 0, until the margin
-becomes negative, and again as soon as z is back at 0.  z' - sqrt(g / h) z decays, so that z either returns or grows
-exponentially; a loss of dynamic stability is the first time at which z exceeds h, an angle of 45 degrees.  The
-linearised pendulum is that of the extrapolated centre of mass (Hof, Gazendam and Sinke, J. Biomech. 38, 2005).
+becomes negative, and again as soon as z is back at 0.  z either returns or grows exponentially, at the rate
+sqrt(g / h); a loss of dynamic stability is the first time at which z exceeds h, an angle of 45 degrees.  The linearised
+pendulum is that of the extrapolated centre of mass (Hof, Gazendam and Sinke, J. Biomech. 38, 2005).
 """
 
 from typing import Any, NamedTuple
@@ -38,38 +38,38 @@ class Pendulum(NamedTuple):
         return cls(GRAVITY / height * seconds**2, height)
 
 
-class Tips(NamedTuple):
+class Losses(NamedTuple):
     """What the plans of some starts lose; steps are counted from 1, and 0 stands for no loss."""
 
-    lost: np.ndarray
+    static: np.ndarray
     """(start,) step of the first loss of static stability."""
-    tipped: np.ndarray
+    dynamic: np.ndarray
     """(start,) step of the first loss of dynamic stability; a plan is not followed beyond it."""
     excursion: np.ndarray
-    """(start,) greatest excursion beyond the edge [mm]."""
+    """(start,) greatest excursion z [mm]."""
 
     @classmethod
-    def none(cls, n_starts: int) -> "Tips":
+    def none(cls, n_starts: int) -> "Losses":
         """Return the record of starts before their first step."""
         return cls(np.zeros(n_starts, dtype=int), np.zeros(n_starts, dtype=int), np.zeros(n_starts))
 
 
-class TipsSoFar:
+class LossesSoFar:
     """Pendulums of all starts, which follow the stability margins of successive parts of a plan."""
 
     def __init__(self, pendulum: Pendulum, n_starts: int) -> None:
         """Begin with pendulums at rest."""
-        self.tips, self._pendulum, self._done = Tips.none(n_starts), pendulum, 0
+        self.losses, self._pendulum, self._done = Losses.none(n_starts), pendulum, 0
         self._state = np.zeros((n_starts, 2))
 
     def add(self, margin: np.ndarray, steps: np.ndarray) -> None:
         """Follow the margins of the next steps, (step, start) [mm]; `steps`, (start,), is each start's last step."""
-        _follow(margin, self._done, steps, self._pendulum, self._state, self.tips)
+        _follow(margin, self._done, steps, self._pendulum, self._state, self.losses)
         self._done += len(margin)
 
 
 @inlined
-def tip(margin, excursion, speed, gain):
+def pendulum_step(margin, excursion, speed, gain):
     """Return excursion and speed [mm, mm per step] after one explicit step of the pendulum."""
     margin = margin if margin > NO_FOOT else NO_FOOT
     speed = speed + gain * (excursion - margin)
@@ -78,18 +78,18 @@ def tip(margin, excursion, speed, gain):
 
 
 @jitted
-def _follow(margin: Any, done: int, steps: Any, pendulum: Any, state: Any, tips: Any) -> None:
+def _follow(margin: Any, done: int, steps: Any, pendulum: Any, state: Any, losses: Any) -> None:
     gain, height = pendulum
-    lost, tipped, most = tips
+    static, dynamic, most = losses
     for i in range(len(steps)):
         z, speed = state[i]
         for n in range(len(margin)):
-            if tipped[i] != 0 or done + n >= steps[i]:
+            if dynamic[i] != 0 or done + n >= steps[i]:
                 break
-            if margin[n, i] <= 0.0 and lost[i] == 0:
-                lost[i] = done + n + 1
-            z, speed = tip(margin[n, i], z, speed, gain)
+            if margin[n, i] <= 0.0 and static[i] == 0:
+                static[i] = done + n + 1
+            z, speed = pendulum_step(margin[n, i], z, speed, gain)
             most[i] = max(most[i], z)
             if z > height:
-                tipped[i] = done + n + 1
+                dynamic[i] = done + n + 1
         state[i, 0], state[i, 1] = z, speed

@@ -8,9 +8,9 @@ import pytest
 import hexmj
 import plain_network as plain
 from hexmj.controllers.cruse1998.weights import general
-from hexmj.controllers.planning import first_tips, planned_tips
+from hexmj.controllers.planning import first_dynamic_losses, planned_dynamic_losses
 from hexmj.legs import FIG1
-from hexmj.tipping import GRAVITY, NO_FOOT, Pendulum, TipsSoFar
+from hexmj.tipping import GRAVITY, NO_FOOT, LossesSoFar, Pendulum
 from stepwise_ldvs import Own
 from tiers import few_of
 
@@ -42,7 +42,7 @@ def test_the_compiled_network_tips_like_the_readable_one(order, acceleration):
     """To the last bit: plain network, margins of its postures, plain pendulum."""
     controller, starts = replace(LDVS, order=order), hexmj.draw_starts(40, 5)
     steps = np.random.default_rng(5).integers(100, 600, len(starts))
-    found = first_tips(controller.begin(starts, np.full(40, 0.6), STRIDE, acceleration), steps, AT_80)
+    found = first_dynamic_losses(controller.begin(starts, np.full(40, 0.6), STRIDE, acceleration), steps, AT_80)
     expected = []
     for start, last in zip(starts.tolist(), steps.tolist(), strict=True):
         walk = plain.walk(start, general(controller.weights), 0.6, last, STRIDE, order, acceleration)
@@ -51,7 +51,7 @@ def test_the_compiled_network_tips_like_the_readable_one(order, acceleration):
         expected.append(readable(hexmj.stability_margin(feet, stance).tolist(), AT_80))
     for values, same in zip(found, np.transpose(expected), strict=True):
         assert np.array_equal(values, same)
-    assert 0 < (found.tipped > 0).sum() < (found.lost > 0).sum()
+    assert 0 < (found.dynamic > 0).sum() < (found.static > 0).sum()
 
 
 @pytest.mark.slow
@@ -61,8 +61,8 @@ def test_fast_tips_are_those_of_the_plan_whatever_the_threads_and_the_batch(name
     velocity, steps = rng.uniform(0.1, 0.9, 300), rng.integers(1, 700, 300)
     for acceleration in (None, hexmj.Acceleration(rate=0.05)):
         walks = hexmj.PRESETS[name], starts, velocity, STRIDE, acceleration
-        fast, planned = (way(begin(*walks), steps, AT_80) for way in (first_tips, planned_tips))
-        alone = first_tips(begin(*walks, threads=1), steps, AT_80)
+        fast, planned = (way(begin(*walks), steps, AT_80) for way in (first_dynamic_losses, planned_dynamic_losses))
+        alone = first_dynamic_losses(begin(*walks, threads=1), steps, AT_80)
         for one, other, third in zip(fast, planned, alone, strict=True):
             assert np.array_equal(one, other)
             assert np.array_equal(one, third)
@@ -80,11 +80,11 @@ def test_a_foreign_controller_tips_likewise():
 def test_a_constant_margin_tips_as_the_equation_says():
     """z = |m| (cosh(t sqrt(g / h)) - 1) beyond the edge, and z = 0 inside of it."""
     seconds, height, outside = 1e-5, 10.0, 2.0
-    so_far, n = TipsSoFar(Pendulum.of(height, seconds), 2), 20_000
+    so_far, n = LossesSoFar(Pendulum.of(height, seconds), 2), 20_000
     so_far.add(np.tile([-outside, outside], (n, 1)), np.full(2, n))
     time = np.arccosh(1.0 + height / outside) / np.sqrt(GRAVITY / height)
-    assert so_far.tips.tipped[0] * seconds == pytest.approx(time, rel=1e-3)
-    assert so_far.tips.excursion[1] == so_far.tips.tipped[1] == so_far.tips.lost[1] == 0
+    assert so_far.losses.dynamic[0] * seconds == pytest.approx(time, rel=1e-3)
+    assert so_far.losses.excursion[1] == so_far.losses.dynamic[1] == so_far.losses.static[1] == 0
 
 
 def test_dynamic_stability_is_lost_after_static_stability_and_less_often_at_higher_speed():

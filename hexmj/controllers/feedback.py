@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from hexmj.controllers.planning import first_losses, first_tips
+from hexmj.controllers.planning import first_dynamic_losses, first_losses
 from hexmj.controllers.protocol import FeedbackPlan, Sensed, SteerablePlan
 from hexmj.controllers.wrappers import WrappedPlan, Wrapper
 from hexmj.errors import InputError
-from hexmj.tipping import Pendulum, Tips
+from hexmj.tipping import Losses, Pendulum
 from hexmj.walks import PlannedWalk, joined
 
 SAME = 1e-9
@@ -66,9 +66,9 @@ class SensedPlan(WrappedPlan):
         """See `protocol.Plan`: in a kinematic walk, the wrapped plan has the same first losses."""
         return first_losses(self._plan, steps)
 
-    def first_tips(self, steps: np.ndarray, pendulum: Pendulum) -> Tips:
+    def first_dynamic_losses(self, steps: np.ndarray, pendulum: Pendulum) -> Losses:
         """See `first_losses`."""
-        return first_tips(self._plan, steps, pendulum)
+        return first_dynamic_losses(self._plan, steps, pendulum)
 
     def sense(self, sensed: Sensed) -> None:
         """Receive the sensed tips, and begin the stance of protracting legs whose feet have gained contact."""

@@ -13,7 +13,7 @@ from hexmj.stability import walk_margin
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import check_memory, thread_count
 from hexmj.timing import Acceleration, Stride, check_reached
-from hexmj.tipping import Pendulum, Tips, TipsSoFar
+from hexmj.tipping import Losses, LossesSoFar, Pendulum
 from hexmj.validate import short
 from hexmj.walks import PLANNED, PlannedWalk, copied
 
@@ -137,12 +137,12 @@ def first_losses(plan: Plan, steps: int | np.ndarray, threads: int | None = None
     return planned_losses(plan, steps, threads)
 
 
-def first_tips(plan: Plan, steps: int | np.ndarray, pendulum: Pendulum, threads: int | None = None) -> Tips:
+def first_dynamic_losses(plan: Plan, steps: int | np.ndarray, pendulum: Pendulum, threads: int | None = None) -> Losses:
     """Return the first losses of static and of dynamic stability of each start; the arguments are as above."""
-    fast = getattr(plan, "first_tips", None)
+    fast = getattr(plan, "first_dynamic_losses", None)
     if fast:
         return fast(np.broadcast_to(steps, len(plan.starts)).copy(), pendulum)
-    return planned_tips(plan, steps, pendulum, threads)
+    return planned_dynamic_losses(plan, steps, pendulum, threads)
 
 
 def planned_losses(plan: Plan, steps: int | np.ndarray, threads: int | None = None) -> np.ndarray:
@@ -159,12 +159,14 @@ def planned_losses(plan: Plan, steps: int | np.ndarray, threads: int | None = No
     return lost
 
 
-def planned_tips(plan: Plan, steps: int | np.ndarray, pendulum: Pendulum, threads: int | None = None) -> Tips:
-    """Return the result of `first_tips` by advancing the plan and computing the margin of each step."""
+def planned_dynamic_losses(
+    plan: Plan, steps: int | np.ndarray, pendulum: Pendulum, threads: int | None = None
+) -> Losses:
+    """Return the result of `first_dynamic_losses` by advancing the plan and computing the margin of each step."""
     steps = np.broadcast_to(steps, len(plan.starts))
-    so_far = TipsSoFar(pendulum, len(steps))
+    so_far = LossesSoFar(pendulum, len(steps))
     at_a_time = min(MOST_AT_ONCE, max(1, HELD // len(steps)))
-    while plan.done < (end := steps[so_far.tips.tipped == 0].max(initial=0)):
+    while plan.done < (end := steps[so_far.losses.dynamic == 0].max(initial=0)):
         walk = advanced(plan, int(min(at_a_time, end - plan.done)))
         so_far.add(walk_margin(walk, threads), steps)
-    return so_far.tips
+    return so_far.losses

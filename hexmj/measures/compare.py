@@ -111,7 +111,7 @@ class Comparison(Study):
             return Round(cells, walks * sum(cell.work for cell in cells))
         if self.precision is None:
             return Round([])
-        samples, chosen = self._sampled(data)
+        samples, chosen = self._sampled(data, self.precision)
         cells, left, widest = [], 0.0, 0.0
         for point, sample, starts in zip(self.points, samples, chosen, strict=True):
             if len(starts):
@@ -120,12 +120,14 @@ class Comparison(Study):
                 widest = max(widest, sample.half_width(self.narrowed))
         return Round(cells, left, f"half width {widest:.3f} of {self.precision:g}" if widest else "planning")
 
-    def _sampled(self, data: Sequence["xr.Dataset"]) -> tuple[list[StratifiedWalks], list[np.ndarray]]:
+    def _sampled(
+        self, data: Sequence["xr.Dataset"], precision: float
+    ) -> tuple[list[StratifiedWalks], list[np.ndarray]]:
         """Return what has walked at each point, and the starts that walk next, (n,), none if all is precise."""
         points = len(self.points)
         samples, batches = [StratifiedWalks(plan) for plan in data[:points]], iter(data[points:])
         while True:
-            chosen = [sample.next_starts(self.narrowed, self.precision or 1.0) for sample in samples]
+            chosen = [sample.next_starts(self.narrowed, precision) for sample in samples]
             for sample, starts in zip(samples, chosen, strict=True):
                 if len(starts):
                     if (batch := next(batches, None)) is None:
@@ -141,7 +143,7 @@ class Comparison(Study):
         if self.precision is None:
             table = _counted(over_axes(sizes, data))
         else:
-            samples, _ = self._sampled(data)
+            samples, _ = self._sampled(data, self.precision)
             table = over_axes(sizes, [sample.table(self.narrowed) for sample in samples], join="outer", data_vars="all")
         starts = draw_starts(self.n_starts, self.seed, self.stride)[table.get_index("start")]
         own: Any = {name: (name, list(v), {"units": UNITS.get(name, "1")}) for name, v in self.axes.items()}
@@ -261,24 +263,18 @@ def _falls(result: "xr.Dataset") -> "xr.Dataset":
 
 
 def _counted(outcomes: "xr.Dataset") -> "xr.Dataset":
-    """Add the frequency of each measure, and the number of starts in each case of `AGREEMENT`, to outcomes."""
-    lost, fell = outcomes.planned_loss < np.inf, outcomes.fall < np.inf
-    table = with_flss(outcomes)
-    for name, case in zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True):
-        table[name] = case.sum("start").assign_attrs(units="1", long_name="number of starts")
-    return table
-
-
-def with_flss(data: "xr.Dataset") -> "xr.Dataset":
-    """Add the FLSS of `MEASURES` with its 95 % Wilson interval, and `agreement`, to outcomes over (..., start)."""
+    """Add all frequencies with 95 % Wilson intervals, `agreement` and the cases of `AGREEMENT` to outcomes."""
     new: dict[str, Any] = {}
     for measure, outcome in MEASURES.items():
-        lost = tables.happened(data[outcome]).transpose(..., "start")
-        new |= tables.frequency(measure, lost.values, tuple(map(str, lost.dims[:-1])))
+        happened = tables.happened(outcomes[outcome]).transpose(..., "start")
+        new |= tables.frequency(measure, happened.values, tuple(map(str, happened.dims[:-1])))
         new[measure][2]["long_name"] = f"{measure} FLSS"
-    same = (data.planned_loss < np.inf) == (data.fall < np.inf)
-    new["agreement"] = same.mean("start").assign_attrs(units="1", long_name="kinematic and physical answer agree")
-    return data.assign(new)
+    lost, fell = outcomes.planned_loss < np.inf, outcomes.fall < np.inf
+    text = "kinematic and physical answer agree"
+    new["agreement"] = (lost == fell).mean("start").assign_attrs(units="1", long_name=text)
+    for name, case in zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True):
+        new[name] = case.sum("start").assign_attrs(units="1", long_name="number of starts")
+    return outcomes.assign(new)
 
 
 def physical_report(result: "xr.Dataset") -> dict[str, float]:

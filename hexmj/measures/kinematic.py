@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import advanced, begin, check_velocities, first_losses, first_tips
+from hexmj.controllers.planning import advanced, begin, check_velocities, first_dynamic_losses, first_losses
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.io import attributes
@@ -114,8 +114,8 @@ def dynamic_losses(
     """
     plan = begin(controller, starts, velocity, stride, acceleration, threads)
     pendulum = Pendulum.of(conditions.standing_height, conditions.seconds(stride))
-    tips = first_tips(plan, _steps(duration, plan.starts, stride), pendulum, threads)
-    return DynamicLosses(_times(tips.lost, stride), _times(tips.tipped, stride), tips.excursion)
+    losses = first_dynamic_losses(plan, _steps(duration, plan.starts, stride), pendulum, threads)
+    return DynamicLosses(_times(losses.static, stride), _times(losses.dynamic, stride), losses.excursion)
 
 
 def _steps(duration: ArrayLike, starts: np.ndarray, stride: Stride) -> np.ndarray:
@@ -245,6 +245,8 @@ def flss(
     stride: Stride = STRIDE,
     acceleration: Acceleration | None = None,
     range_of: int = RANGE,
+    measure: Planned = "kinematic",
+    conditions: Conditions = Conditions(),
     folder: Path | None = None,
     **how: Unpack[Execution],
 ) -> "xr.Dataset":
@@ -259,6 +261,8 @@ def flss(
         stride: step range, lines of the tips and time step.
         acceleration: the accelerating procedure of Eq. 11; without it V_r is constant.
         range_of: number of starts that are computed and cached together; the result does not depend on it.
+        measure: 'kinematic', or 'dynamic' for the FLDS, see `flds`.
+        conditions: conditions of the dynamic measure.
         folder: directory in which finished cells are cached; None caches nothing.
         how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
 
@@ -271,7 +275,7 @@ def flss(
     """
     several: Any = np.atleast_1d(velocities).tolist()
     walks = n_starts, observation_time, seed, stride, acceleration
-    return run_study(KinematicFlss(controller, several, *walks, range_of), folder, **how)
+    return run_study(KinematicFlss(controller, several, *walks, range_of, measure, conditions), folder, **how)
 
 
 def flds(
@@ -279,14 +283,7 @@ def flds(
     velocities: Sequence[float] | float,
     *,
     conditions: Conditions = Conditions(),
-    n_starts: int = KinematicFlss.n_starts,
-    observation_time: str | float = KinematicFlss.observation_time,
-    seed: int = KinematicFlss.seed,
-    stride: Stride = STRIDE,
-    acceleration: Acceleration | None = None,
-    range_of: int = RANGE,
-    folder: Path | None = None,
-    **how: Unpack[Execution],
+    **options: Any,
 ) -> "xr.Dataset":
     """Return the FLDS, the frequency of the loss of dynamic stability, at each velocity, over the same starts.
 
@@ -294,7 +291,7 @@ def flds(
         controller: controller that plans the walks.
         velocities: one or several V_r, each 0 <= V < 1; the final velocities when accelerating.
         conditions: V_p and standing height, from which the pendulum follows, see `tipping`; the others have no effect.
-        n_starts: this and all other arguments as for `flss`.
+        options: other arguments of `flss`.
 
     Returns:
         The variables of `flss`, with `flds` in place of `flss`.
@@ -302,9 +299,7 @@ def flds(
     Raises:
         InputError: an argument is out of range.
     """
-    several: Any = np.atleast_1d(velocities).tolist()
-    walks = n_starts, observation_time, seed, stride, acceleration
-    return run_study(KinematicFlss(controller, several, *walks, range_of, "dynamic", conditions), folder, **how)
+    return flss(controller, velocities, measure="dynamic", conditions=conditions, **options)
 
 
 def flss_over_range(

@@ -15,7 +15,7 @@ from hexmj.physics.rollout import Chunk
 from hexmj.physics.settle import Settled
 from hexmj.rotations import lowest, matrix
 from hexmj.stability import loss_time, walk_margin
-from hexmj.tipping import Pendulum, TipsSoFar
+from hexmj.tipping import LossesSoFar, Pendulum
 from hexmj.walks import PlannedWalk, Walk
 
 GROUNDED = 0.1
@@ -178,10 +178,10 @@ class WalkSoFar(OutcomesSoFar):
     def __init__(self, settled: Settled, planned: PlannedWalk, threads: int | None = None) -> None:
         """Begin with the plan of the whole walk; a body with sensors of the feet's forces also stores forces."""
         pendulum = Pendulum.of(settled.conditions.standing_height, settled.conditions.seconds(settled.stride))
-        so_far = TipsSoFar(pendulum, len(settled.starts))
+        so_far = LossesSoFar(pendulum, len(settled.starts))
         so_far.add(walk_margin(planned, threads), np.full(len(settled.starts), len(planned.time)))
-        lost, tipped, _ = so_far.tips
-        super().__init__(settled, *(np.where(step > 0, step * settled.stride.dt, np.inf) for step in (lost, tipped)))
+        static, dynamic, _ = so_far.losses
+        super().__init__(settled, *(np.where(step > 0, step * settled.stride.dt, np.inf) for step in (static, dynamic)))
         shape, compiled = planned.stance.shape, settled.compiled
         axes = {"height": (6,), "load": (6,), "qpos": (compiled.model.nq,), "centre_of_mass": (3,)}
         if compiled.columns.feet_push.stop > compiled.columns.feet_push.start:

@@ -165,6 +165,7 @@ def _controller_toml(problem: Problem, vector: np.ndarray) -> str:
 
 
 FREQUENCIES = ("FLSS", "FLDS")
+"""Costs that are frequencies and need no explanation."""
 
 
 def convergence_figure(history: "xr.Dataset") -> "Figure":

@@ -68,8 +68,8 @@ class League(Study):
     """Observation time: 'walk' (three periods of a single leg), 'start' (two swings) or a number [time units]."""
 
     protocol: Begins = "random"
-    """Where kinematic and physical walks begin: at 'random' starts, or in the 'steady' state that the
-    plan reaches from them in ten periods of a leg. Accelerating walks and trials do not change."""
+    """Where kinematic and physical walks begin: at 'random' starts, or in the 'steady' state that the plan reaches from
+    them in ten periods of a leg. The starts of gaits and trials do not change."""
 
     n_starts: int = field(default=1000, kw_only=True)
     """Number of random starts in kinematic walks, the same for every controller and velocity."""

@@ -17,7 +17,7 @@ import numpy as np
 from hexmj.jitted import inlined, jitted, part
 from hexmj.legs import MIRROR, N2, N4
 from hexmj.stability import margin_of
-from hexmj.tipping import tip
+from hexmj.tipping import pendulum_step
 
 LANES = 64
 PRINTED, UNDELAYED, SEQUENTIAL = range(3)
@@ -271,7 +271,7 @@ def _block():
 
 
 @part
-def _tip_over(z, pendulum, feet, stands, k):
+def _follow_pendulums(z, pendulum, feet, stands, k):
     """Let the pendulums of a block follow a step; `feet`, (leg, 2), and `stands`, (leg,), are scratch arrays."""
     gain, height = pendulum
     for j in range(LANES):
@@ -283,7 +283,7 @@ def _tip_over(z, pendulum, feet, stands, k):
         for leg in range(6):
             feet[leg, 0], feet[leg, 1] = z[(X + leg) * LANES + j] + k[_ORIGIN + leg], k[_Y + leg]
             stands[leg] = z[(S + leg) * LANES + j] == 1.0
-        excursion, speed = tip(margin_of(feet, stands), excursion, z[SPEED * LANES + j], gain)
+        excursion, speed = pendulum_step(margin_of(feet, stands), excursion, z[SPEED * LANES + j], gain)
         z[EXCURSION * LANES + j], z[SPEED * LANES + j] = excursion, speed
         z[MOST * LANES + j] = max(z[MOST * LANES + j], excursion)
         z[TIPPED * LANES + j] = z[DONE * LANES + j] if excursion > height else 0.0
@@ -291,9 +291,9 @@ def _tip_over(z, pendulum, feet, stands, k):
 
 @jitted
 def first_losses(
-    starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, rules: Any, pendulum: Any, tips: Any
+    starts: Any, v: Any, v_final: Any, steps: Any, p: Any, k: Any, rules: Any, pendulum: Any, losses: Any
 ) -> None:
-    """Write what each start loses within its `steps` to `tips`, the arrays of a `tipping.Tips`.
+    """Write what each start loses within its `steps` to `losses`, the arrays of a `tipping.Losses`.
 
     `starts` is (start, leg), `v`, `v_final` and `steps` are (start,); `p`, `k` and `rules` are the parts of
     `network.Constants`: weights, constants and choices. Walks end at the loss of dynamic stability, or, if the gain of
@@ -301,7 +301,7 @@ def first_losses(
     """
     z, start_in = _block(), np.full(LANES, -1)  # index of the start in each lane; -1 if the lane is empty
     feet, stands = np.empty((6, 2)), np.empty(6, np.bool_)
-    lost, tipped, most = tips
+    static, dynamic, most = losses
     end = TIPPED if pendulum[0] > 0.0 else LOST
     following = undecided = 0
     while True:
@@ -309,7 +309,7 @@ def first_losses(
             for j in range(LANES):
                 if not _undecided(z, j, end) and start_in[j] >= 0:
                     i = start_in[j]
-                    lost[i], tipped[i] = z[LOST * LANES + j], z[TIPPED * LANES + j]
+                    static[i], dynamic[i] = z[LOST * LANES + j], z[TIPPED * LANES + j]
                     most[i] = z[MOST * LANES + j]
                     start_in[j] = -1
                 if start_in[j] < 0 and following < len(starts):
@@ -320,7 +320,7 @@ def first_losses(
             return
         _step(z, rules[_ORDER], p, k, rules)
         if end == TIPPED:
-            _tip_over(z, pendulum, feet, stands, k)
+            _follow_pendulums(z, pendulum, feet, stands, k)
         undecided = 0
         for j in range(LANES):
             undecided += _undecided(z, j, end)

@@ -13,13 +13,13 @@ import numpy as np
 
 import hexmj.controllers.cruse1998.kernel as kernel
 from hexmj.controllers.cruse1998.weights import NEIGHBOURS, PLACES, AnyWeights, Symmetric, Weights, general
-from hexmj.controllers.planning import planned_losses, planned_tips
+from hexmj.controllers.planning import planned_dynamic_losses, planned_losses
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import run_blocks, thread_count
 from hexmj.timing import Acceleration, Stride
-from hexmj.tipping import Pendulum, Tips
+from hexmj.tipping import Losses, Pendulum
 from hexmj.validate import choice, short, whole
 from hexmj.walks import PlannedWalk
 
@@ -224,26 +224,26 @@ class NetworkPlan:
         """See `protocol.Plan`; the call keeps only the present state of each walk in memory."""
         if "_blocks" in vars(self):
             return planned_losses(self, steps, self.threads)
-        return self._tips(steps, Pendulum(0.0, 0.0)).lost
+        return self._losses(steps, Pendulum(0.0, 0.0)).static
 
-    def first_tips(self, steps: np.ndarray, pendulum: Pendulum) -> Tips:
+    def first_dynamic_losses(self, steps: np.ndarray, pendulum: Pendulum) -> Losses:
         """See `protocol.Plan`."""
         if "_blocks" in vars(self):
-            return planned_tips(self, steps, pendulum, self.threads)
-        return self._tips(steps, pendulum)
+            return planned_dynamic_losses(self, steps, pendulum, self.threads)
+        return self._losses(steps, pendulum)
 
-    def _tips(self, steps: np.ndarray, pendulum: Pendulum) -> Tips:
-        tips, size = Tips.none(len(steps)), len(steps)
+    def _losses(self, steps: np.ndarray, pendulum: Pendulum) -> Losses:
+        losses, size = Losses.none(len(steps)), len(steps)
         block = max(8 * kernel.LANES, -(-size // (4 * thread_count(self.threads))))
         block = max(kernel.LANES, min(block, AT_ONCE // int(max(1, steps.max(initial=0)))))
 
         def work(begin: int, end: int) -> None:
             part = slice(begin, end)
             walks = self.starts[part], self.first[part], self.final[part], steps[part]
-            kernel.first_losses(*walks, *self.constants, tuple(pendulum), tuple(column[part] for column in tips))
+            kernel.first_losses(*walks, *self.constants, tuple(pendulum), tuple(column[part] for column in losses))
 
         run_blocks(work, size, block, self.threads)
-        return tips
+        return losses
 
     def first_losses_after(self, unseen: int, seen: int) -> np.ndarray:
         """Advance by `unseen` steps, then by `seen` steps, and find the first loss within the `seen` steps.
