@@ -64,7 +64,8 @@ class LossesSoFar:
 
     def add(self, margin: np.ndarray, steps: np.ndarray) -> None:
         """Follow the margins of the next steps, (step, start) [mm]; `steps`, (start,), is each start's last step."""
-        _follow(margin, self._done, steps, self._pendulum, self._state, self.losses)
+        # plain tuples: numba's cache on disk refers to classes by name
+        _follow(margin, self._done, steps, tuple(self._pendulum), self._state, tuple(self.losses))
         self._done += len(margin)
 
 
