@@ -111,11 +111,11 @@ def _own_sets() -> str:
 
 
 def league(folder: Path) -> list[str]:
-    """Return the tables of the league, the fewest falls first, and draw its two figures."""
+    """Return the tables of the league, the fewest falls first, and draw its figures."""
     result = io.load(folder / "league.nc")
     with as_shipped():
-        io.save_figure(hexmj.plot(result), IMAGES / "league.png")
-        io.save_figure(hexmj.plot(result, "walks"), IMAGES / "league_walks.png")
+        for view, name in {"league": "league", "walks": "league_walks", "prediction": "prediction"}.items():
+            io.save_figure(hexmj.plot(result, view), IMAGES / f"{name}.png")
     rows = []
     for name in by_rank(result).entrant.values:
         own = result.sel(entrant=name)
