@@ -38,6 +38,10 @@ class Pendulum(NamedTuple):
         return cls(GRAVITY / height * seconds**2, height)
 
 
+STATIC = Pendulum(0.0, 0.0)
+"""A pendulum without weight, with which only static stability is followed."""
+
+
 class Losses(NamedTuple):
     """What the plans of some starts lose; steps are counted from 1, and 0 stands for no loss."""
 

@@ -7,12 +7,19 @@ import pytest
 
 import hexmj
 from hexmj.controllers.conformance import check_controller
-from hexmj.controllers.planning import begin, first_losses, planned_losses
+from hexmj.controllers.planning import (
+    begin,
+    first_dynamic_losses,
+    first_losses,
+    planned_dynamic_losses,
+    planned_losses,
+)
 from hexmj.controllers.wrappers import WARM_UP, FromSteadyState
 from hexmj.measures.compare import Comparison
 from hexmj.stability import loss_time
 from hexmj.studies.league import League
 from hexmj.timing import Stride
+from hexmj.tipping import Pendulum
 from hexmj.walks import PLANNED, part_of
 
 STRIDE, STARTS = Stride(), hexmj.draw_starts(4, 66)
@@ -38,6 +45,16 @@ def test_a_steady_walk_is_the_later_part_of_a_long_walk(name):
     assert np.array_equal(steady.time, np.arange(1, 301) * STRIDE.dt)
     losses = hexmj.compare(controller, 0.5, n_starts=4, **STEADY).planned_loss.values.ravel()
     assert np.array_equal(losses, loss_time(steady))
+
+
+@pytest.mark.parametrize("steps", [900, np.arange(600, 900)])
+def test_losses_from_the_steady_state_are_those_of_the_plan(steps):
+    starts, pendulum = hexmj.draw_starts(300, 66), Pendulum.of(10.0, 0.00125)
+    plan, other = (begin(FromSteadyState(hexmj.LDVS), starts, 0.7, STRIDE) for _ in range(2))
+    fast = first_dynamic_losses(plan, steps, pendulum)
+    assert fast.static.any() and fast.dynamic.any()
+    for found, planned in zip(fast, planned_dynamic_losses(other, steps, pendulum), strict=True):
+        assert np.array_equal(found, planned)
 
 
 def test_steady_results_depend_on_neither_threads_nor_batch():

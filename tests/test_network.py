@@ -88,7 +88,7 @@ def test_any_posture_is_stable_where_its_plain_form_is(geometry):
     tips, standing = random_starts(rng, size), rng.random((size, 6)) < 0.6
     plan = UNCOORDINATED.begin(tips, np.zeros(size), stride)
     plan.see(tips, standing)
-    lost, now = plan.first_losses_after(0, 1), zip(plan.tips.tolist(), plan.standing.tolist(), strict=True)
+    lost, now = plan.losses_after(0, 1).static, zip(plan.tips.tolist(), plan.standing.tolist(), strict=True)
     assert np.array_equal(lost, [0.0 if plain.stable(x, s, stride) else 1.0 for x, s in now])
     assert plan.done == 1
     assert 0 < (lost > 0).sum() < size
@@ -101,13 +101,13 @@ def test_a_centre_of_mass_on_the_edge_is_not_stable():
     tips[:, [1, 4]] = np.array([-4.0, -4.5, -4.0, -3.5])[:, np.newaxis]
     plan = UNCOORDINATED.begin(tips, np.zeros(4), STRIDE)
     plan.see(tips, standing)
-    assert np.array_equal(plan.first_losses_after(0, 1), [1, 0, 1, 0])
+    assert np.array_equal(plan.losses_after(0, 1).static, [1, 0, 1, 0])
 
 
 @pytest.mark.parametrize("unseen", [0, 1, 40])
 def test_losses_that_are_not_seen_do_not_count(unseen):
     starts, seen = random_starts(np.random.default_rng(11), LANES + 7), 100
-    lost = UNCOORDINATED.begin(starts, np.full(len(starts), 0.5), STRIDE).first_losses_after(unseen, seen)
+    lost = UNCOORDINATED.begin(starts, np.full(len(starts), 0.5), STRIDE).losses_after(unseen, seen).static
     unstable = walk_margin(walk(starts, UNCOORDINATED, 0.5, 0.1 * (unseen + seen)))[unseen:] <= 0.0
     assert np.array_equal(lost, np.where(unstable.any(axis=0), unseen + 1 + np.argmax(unstable, axis=0), 0))
     assert (lost > 0).any()
@@ -116,7 +116,7 @@ def test_losses_that_are_not_seen_do_not_count(unseen):
 def test_one_may_look_again_and_again():
     starts, period = random_starts(np.random.default_rng(12), LANES + 7), 50
     plan = UNCOORDINATED.begin(starts, np.full(len(starts), 0.5), STRIDE)
-    lost = [plan.first_losses_after(period - 1, 1) for _ in range(6)][-1]
+    lost = [plan.losses_after(period - 1, 1).static for _ in range(6)][-1]
     looked = walk_margin(walk(starts, UNCOORDINATED, 0.5, 0.1 * 6 * period))[period - 1 :: period] <= 0.0
     assert np.array_equal(lost, np.where(looked.any(axis=0), period * (1 + np.argmax(looked, axis=0)), 0))
     assert (lost > period).any()

@@ -15,6 +15,7 @@ from hexmj.cli.output import Column, four_digits, grid, report_line
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.wrappers import by_protocol
+from hexmj.errors import InputError
 from hexmj.measures.tables import Measure
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ carried: it leaves the polygon of the feet that carry load in the simulation
 physical: falls, that is, the trunk touches the ground
 
 agree: fraction of starts with both a kinematic loss and a fall, or neither
+agree, FLDS: the same for the dynamic loss and a fall
 speed: walked over commanded, of starts without a fall"""
 """Lines that explain the tables of `hexmj compare`."""
 
@@ -44,12 +46,15 @@ CASES = "both, kin., phys., none: starts with both, only a loss, only a fall, ne
 DYNAMIC = ("vp", "standing_height")
 """Options of `PHYSICAL` on which the dynamic measure depends."""
 
-WALKS = {"walks": "walks", "plain_walks": "plain"}
+WALKS = {"walks": "walks", "plain_walks": "plain walks"}
 """Number of walks in a result of --precision -> heading of its column."""
 
-PLAIN = "plain: number of walks that random starts would need for an interval of this width"
+PLAIN = "plain walks: number of walks that random starts would need for an interval of this width"
 
-TIMES = ("planned loss", "grounded loss", "carried loss", "fall")
+FREQUENCIES = {"kinematic": "kinematic FLSS", "dynamic": "FLDS", "physical": "frequency of falls"}
+"""Measure of `hexmj flss` -> name of its frequency."""
+
+TIMES = ("kinematic loss", "dynamic loss", "grounded loss", "carried loss", "fall")
 """Entries of a walk's summary that are times [time units]; infinity says that the event does not happen."""
 
 
@@ -104,8 +109,8 @@ class FlssOptions:
     """Count losses of the planned static stability (kinematic), of the planned dynamic stability (dynamic), or falls of
     the insect in MuJoCo (physical)."""
     precision: float | None = None
-    """Half width of the 95 % interval of falls that is enough, such as 0.03: 20,000 starts are planned, and as many
-    walk as the interval needs. By default, all of --starts walk."""
+    """Half width of the 95 % interval of falls that is enough, such as 0.03, with --measure physical: 20,000 starts are
+    planned, and as many walk as the interval needs. By default, all of --starts walk."""
     range_of: int | None = None
     """Number of starts that are computed and cached together, by default 1600000; results do not depend on it."""
     conditions: Conditions = Conditions()
@@ -128,7 +133,8 @@ class Flss(StudyCommand):
         if given.precision is not None:
             no_effect(given, ["starts"], "with --precision", {"starts": None})
         if given.measure != "physical":
-            no_effect(given, ["precision"], f"with --measure {given.measure}", {"precision": None})
+            if given.precision is not None:
+                raise InputError(f"--precision = {given.precision:g} needs --measure physical; all plans are walked")
             return super().build(given)
         from hexmj.measures.compare import PhysicalFlss
 
@@ -153,7 +159,7 @@ class Flss(StudyCommand):
 
         columns: Any = {name: _four_digits(name) for name in _over_velocity(result) if result[name].notnull().any()}
         measure = result.attrs["measure"]
-        yield f"{measure} {'FLDS' if measure == 'dynamic' else 'FLSS'} of {result.attrs['model']}"
+        yield f"{FREQUENCIES[measure]} of {result.attrs['model']}"
         yield grid(result, ("velocity",), columns)
         if "walks" in result:
             yield PLAIN
@@ -234,7 +240,7 @@ class Compare(StudyCommand):
 
         summary = {axis: result[axis].values.tolist() for axis in (*axes_of(result), "velocity")}
         keys = [measure + end for measure in MEASURES for end in ("", "_low", "_high")]
-        keys += [key for key in ("agreement", *AGREEMENT, *WALKS) if key in result]
+        keys += [key for key in ("agreement", "dynamic_agreement", *AGREEMENT, *WALKS) if key in result]
         for name in result.controller.values:
             summary[name] = {key: result[key].sel(controller=name).values.tolist() for key in keys}
         durations = {"duration": result.duration.values.tolist()}
@@ -246,7 +252,7 @@ class Compare(StudyCommand):
 
         axes, names = ("controller", *axes_of(result), "velocity"), ("both", "kin.", "phys.", "none")
         columns: dict[str, Column] = {"t": lambda data: four_digits(data.duration.item())}
-        answers: dict[str, Column] = {"agree": "agreement"}
+        answers: dict[str, Column] = {"agree": "agreement", "agree, FLDS": "dynamic_agreement"}
         if study.precision is None:
             answers |= zip(names, AGREEMENT, strict=True)
         else:

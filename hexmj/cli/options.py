@@ -294,7 +294,7 @@ def no_effect(given: SimpleNamespace, names: Collection[str], reason: str, more:
     defaults = Conditions().values() | {"feedback": False} | dict(more)
     for name in names:
         if (value := getattr(given, name, defaults[name])) != defaults[name]:
-            raise InputError(f"--{name.replace('_', '-')} = {value} has no effect {reason}")
+            raise InputError(f"--{name.replace('_', '-')} = {value} has no effect {reason}; leave it out")
 
 
 def _given(settings: type, given: SimpleNamespace) -> dict[str, Any]:

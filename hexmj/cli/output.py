@@ -13,8 +13,11 @@ if TYPE_CHECKING:
 Column = str | Callable[["xr.Dataset"], str]
 """Column of a table: name of a variable, or a function from the data of a row to the text of its cell."""
 
-HEADS = {"velocity": "V", "vp": "V_p", "leg_mass": "mass", "flss": "FLSS"}
+HEADS = {"velocity": "V", "vp": "V_p", "leg_mass": "mass", "flss": "FLSS", "flds": "FLDS"}
 """Axis or variable of a result -> its heading in tables, where it is not its name."""
+
+NARROW = 0.05
+"""Width of an interval up to which its ends are printed with three digits."""
 
 GAP = 2
 """Number of characters between two columns of a table."""
@@ -98,10 +101,11 @@ def _text(data: "xr.Dataset", column: Column) -> str:
 
 
 def interval(data: "xr.Dataset", measure: str) -> str:
-    """Return a frequency with its interval, such as 0.520 (.39-.64)."""
+    """Return a frequency with its interval, such as 0.520 (.39-.64) or, if it is narrow, 0.520 (.514-.526)."""
     middle, low, high = (data[measure + end].item() for end in ("", "_low", "_high"))
-    text = f"{middle:.3f} ({low:.2f}-{high:.2f})".replace("(0", "(").replace("-0", "-").replace("-1.00", "-1.0")
-    return "-" if middle != middle else text
+    ends = (f"{end:.{2 if high - low > NARROW else 3}f}" for end in (low, high))
+    text = "-".join("1.0" if float(end) == 1.0 else end.removeprefix("0") for end in ends)
+    return "-" if middle != middle else f"{middle:.3f} ({text})"
 
 
 def difference(data: "xr.Dataset", measure: str) -> str:

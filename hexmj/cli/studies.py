@@ -36,7 +36,8 @@ class Map(StudyCommand):
         from hexmj.measures.compare import MEASURES
 
         saved: dict[str, Column] = {"static": lambda data: f"{data.static.item():.3f}", "saved": _saved}
-        changes = {name: partial(difference, measure=name) for name in ("dynamics", "change")}
+        names = {"physical - static": "dynamics", "change": "change"}
+        changes = {name: partial(difference, measure=measure) for name, measure in names.items()}
         axes, at = (study.over, "velocity"), result.rename(value=study.over)
         over = HEADS.get(study.over, study.over.replace("_", " "))
         yield f"{study.controller.name} over {over}: FLSS, with 95 % intervals"
@@ -45,8 +46,7 @@ class Map(StudyCommand):
         yield grid(at, axes, froude | {name: name for name in MEASURES})
         yield (
             "static: FLSS of the plan with the body's own centre of mass; saved: fraction of these losses without a"
-            f" fall; dynamics: physical minus static; change: physical FLSS minus that at {over} ="
-            f" {result.attrs['reference']:g}"
+            f" fall; change: physical FLSS minus that at {over} = {result.attrs['reference']:g}"
         )
         yield grid(at, axes, saved | changes)
         yield f"Number of starts at each {over} by what keeps them up or makes them fall (see hexmj.studies.mechanisms)"

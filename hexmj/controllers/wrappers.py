@@ -6,10 +6,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hexmj.controllers.planning import HELD, advanced, begin, check_velocities
+from hexmj.controllers.planning import HELD, advanced, begin, check_velocities, planned_dynamic_losses
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, Sensed, check_controller_type
 from hexmj.errors import InputError
 from hexmj.timing import Stride, steps_within
+from hexmj.tipping import STATIC, Losses, Pendulum
 from hexmj.validate import number, whole
 from hexmj.walks import PlannedWalk
 
@@ -96,13 +97,27 @@ class LatePlan(WrappedPlan):
 
     def __init__(self, plan: Plan, late: int) -> None:
         """Advance a plan at time 0 by a warm-up of `late` steps."""
+        skip: Any = getattr(plan, "skip", plan.advance)
         while plan.done < late - 1:
-            advanced(plan, min(max(1, HELD // len(plan.starts)), late - 1 - plan.done))
+            skip(min(max(1, HELD // len(plan.starts)), late - 1 - plan.done))
         super().__init__(plan)
         last = advanced(plan, 1)
         self.starts, self.y, self.done, self._late = last.x[0], last.y[0], 0, late
         if isinstance(plan, FeedbackPlan):
             self.sense = plan.sense
+        if hasattr(plan, "losses_after"):
+            self.first_losses, self.first_dynamic_losses = self._first_losses, self._first_dynamic_losses
+
+    def _first_losses(self, steps: np.ndarray) -> np.ndarray:
+        """See `protocol.Plan`."""
+        return self._first_dynamic_losses(steps, STATIC).static
+
+    def _first_dynamic_losses(self, steps: np.ndarray, pendulum: Pendulum) -> Losses:
+        """See `protocol.Plan`."""
+        if (steps != steps[0]).any():
+            return planned_dynamic_losses(self, steps, pendulum)
+        static, dynamic, excursion = self._plan.losses_after(0, int(steps[0]), pendulum)
+        return Losses(*(np.where(step > 0, step - self._late, 0) for step in (static, dynamic)), excursion)
 
     def advance(self, steps: int) -> PlannedWalk:
         """Return the next steps; time counts from the end of the warm-up."""

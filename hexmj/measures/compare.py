@@ -208,7 +208,8 @@ def compare(
 
     Returns:
         Over (controller, *axes, velocity): the frequencies of `MEASURES` with their 95 % intervals (`kinematic`,
-        `kinematic_low`, ...), and `agreement`, the fraction of starts with a planned loss and a fall, or with neither.
+        `kinematic_low`, ...), and `agreement`, the fraction of starts with a planned loss and a fall, or with neither;
+        `dynamic_agreement` is that of the dynamic loss.
         Without a precision, the intervals are Wilson's, and there is the number of starts in each case of `AGREEMENT`.
         With a precision, there are the number of `walks`, and `plain_walks`, the number that walks from all random
         starts would need for the same intervals.
@@ -269,9 +270,10 @@ def _counted(outcomes: "xr.Dataset") -> "xr.Dataset":
         happened = tables.happened(outcomes[outcome]).transpose(..., "start")
         new |= tables.frequency(measure, happened.values, tuple(map(str, happened.dims[:-1])))
         new[measure][2]["long_name"] = f"{measure} FLSS"
-    lost, fell = outcomes.planned_loss < np.inf, outcomes.fall < np.inf
-    text = "kinematic and physical answer agree"
-    new["agreement"] = (lost == fell).mean("start").assign_attrs(units="1", long_name=text)
+    lost, tipped, fell = (outcomes[name] < np.inf for name in ("planned_loss", "dynamic_loss", "fall"))
+    for name, measure, answer in ("agreement", "kinematic", lost), ("dynamic_agreement", "dynamic", tipped):
+        text = f"{measure} and physical answer agree"
+        new[name] = (answer == fell).mean("start").assign_attrs(units="1", long_name=text)
     for name, case in zip(AGREEMENT, (lost & fell, lost & ~fell, ~lost & fell, ~lost & ~fell), strict=True):
         new[name] = case.sum("start").assign_attrs(units="1", long_name="number of starts")
     return outcomes.assign(new)

@@ -11,9 +11,7 @@ import numpy as np
 
 from hexmj.conditions import Conditions, unusual
 from hexmj.io import settings
-from hexmj.measures.tables import happened
-from hexmj.plotting import BESIDE, LEGEND, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture, where
-from hexmj.stats import paired_difference
+from hexmj.plotting import BESIDE, LEGEND, MEASURE_STYLES, flss_axes, frequency_curve, head, in_figure, picture
 from hexmj.timing import Stride
 
 if TYPE_CHECKING:
@@ -31,7 +29,7 @@ UNITS: dict[str, str] = {
 SYMBOLS = {"vp": "$V_p$", "aep0": "AEP$_0$", "pep0": "PEP$_0$", "pep_min": "PEP_min"}
 """Field of `Conditions` or `Stride` -> its symbol in a caption, if that is not the field's name."""
 
-TIMES = {"walk": "three leg periods", "start": "two swings"}
+TIMES = {"walk": "three periods of a leg", "start": "two swings"}
 """Named observation time -> its text in a caption."""
 
 FEW = 3
@@ -53,7 +51,8 @@ def caption(result: "xr.Dataset", least: int | None = None) -> str:
     words = [_controllers(recorded.get("controllers", {}), result)]
     if "walks" in result:
         fewest, most = int(result.walks.min()), int(result.walks.max())
-        words.append(f"{fewest} to {most} of {recorded['starts']} planned starts walk")
+        walked = f"{fewest} to {most}" if most > fewest else f"{most}"
+        words.append(f"{walked} of {recorded['starts']} planned starts walk")
     elif "starts" in recorded:
         words.append(starts_in_words(recorded["starts"]))
     if (time := recorded.get("observation_time")) is not None:
@@ -128,21 +127,11 @@ def comparison_figure(result: "xr.Dataset") -> "Figure":
             axes.set_xlabel(label)
     handles, _ = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=2)
-    more = np.array([_more_losses_than_falls(data) for data in panels.values()])
-    found = [f"{title} {where(result.velocity.values, row)}" for title, row in zip(panels, more, strict=True)]
-    found = found if len(panels) <= FEW else [f"in {more.sum()} of {more.size} cases"]
-    exceeds = "exceeds the frequency of falls"
-    finding = f"clearly {exceeds}: {'; '.join(found)}" if more.any() else f"at no velocity clearly {exceeds}"
+    away = (abs(result[measure] - result.physical).mean().item() for measure in ("kinematic", "dynamic"))
+    finding = "mean distance from the frequency of falls: kinematic FLSS {:.2f}, FLDS {:.2f}".format(*away)
     part = f"the first {MOST} of {len(panels)} panels" if len(panels) > MOST else ""
-    head(figure, f"the kinematic FLSS {finding}", caption(result), "bars: 95 % intervals", part)
+    head(figure, finding, caption(result), "bars: 95 % intervals", part)
     return figure
-
-
-def _more_losses_than_falls(data: "xr.Dataset") -> np.ndarray:
-    """Return at which velocities losses are more frequent than falls beyond the 95 % intervals, (velocity,)."""
-    if "weight" in data:  # walks of a precision are not drawn evenly
-        return (data.kinematic_low > data.physical_high).values
-    return paired_difference(happened(data.planned_loss).values, happened(data.fall).values)[1] > 0.0
 
 
 def axes_of(result: "xr.Dataset") -> list[str]:

@@ -164,8 +164,10 @@ class StratifiedWalks:
                 new |= frequency(name, np.isfinite(self._plan[outcome].values), ())
             else:
                 new |= columns(name, (), *np.clip([value, value - half, value + half], 0.0, 1.0))
-        same = np.isfinite(self._times("planned_loss")) == np.isfinite(self._times("fall"))
-        new |= {"agreement": self.estimate(same).value, "walks": len(self._starts)}
+        for agreement, outcome in {"agreement": "planned_loss", "dynamic_agreement": "dynamic_loss"}.items():
+            same = np.isfinite(self._times(outcome)) == np.isfinite(self._times("fall"))
+            new[agreement] = self.estimate(same).value
+        new["walks"] = len(self._starts)
         new["plain_walks"] = max(estimates[name].plain for name in narrowed)
         new["weight"] = "start", (self._share / np.maximum(self._walked, 1))[self._stratum[self._starts]]
         return table.assign(new).sortby("start")

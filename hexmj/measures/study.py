@@ -67,7 +67,7 @@ class Study:
                 raise InputError(f"{name} = {given[name]}; expected {default[name]}, since the study sets it itself")
         choice("protocol", self.protocol, get_args(Begins))
         if (self.procedure or 0 in self.observed[0]) and self.protocol == "steady":
-            raise InputError("protocol = steady has no walks that accelerate or stand still; use the protocol random")
+            raise InputError("protocol = steady allows neither an acceleration nor V = 0; use the protocol random")
         for name, values in self.varies.items():
             distinct(name, values)
         for conditions in self.varied:

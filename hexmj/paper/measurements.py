@@ -63,7 +63,7 @@ def losses(
         times = [observation_duration(OBSERVATION_TIMES[row], velocity, stride, acceleration) for row in rows]
         seen = steps_within(times, stride)
         plan, longest = network.begin(starts, at, stride, acceleration, threads), int(seen.max())
-        first = plan.first_losses_after(unseen, longest) if late else first_losses(plan, longest, threads)
+        first = plan.losses_after(unseen, longest).static if late else first_losses(plan, longest, threads)
         lost[rows] = (first > 0) & (first <= unseen + seen[:, np.newaxis])
     return _lost(lost)
 

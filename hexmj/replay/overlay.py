@@ -79,7 +79,7 @@ class Overlay:
         """Return the legend of the marks in the scene and of the diagram's bars."""
         tip, polygon, centre = (tuple(round(255 * part) for part in colour) for colour in (TIP, STABLE, CENTRE))
         marks = ("●", INK), ("▬", self._swing), ("◎", tip), ("■", polygon), ("●", centre)
-        text = "● foot stands  ▬ ○ foot swings  ◎ planned tip  ■ support polygon  ● centre of mass  "
+        text = "● foot at the ground  ▬ ○ above it  ◎ planned tip  ■ support polygon  ● centre of mass  "
         font = _font(self._pixels(11))
         image = Image.new("RGBA", (round(font.getlength(text)), self._pixels(STRIP)), (*PAPER, 0))
         draw, middle, end = ImageDraw.Draw(image), image.height / 2, 0

@@ -27,6 +27,7 @@ from hexmj.rotations import rotated
 from hexmj.stability import loss_time, walk_margin
 from hexmj.starts import draw_start
 from hexmj.timing import Acceleration, Stride, observation_duration
+from hexmj.tipping import LossesSoFar, Pendulum
 from hexmj.walks import PlannedWalk, one_start
 
 _STEP, _LEG, _ONCE = ("step",), ("step", "leg"), ()
@@ -44,6 +45,7 @@ PLANNED = {
     "planned_stance": (_LEG, "1", "leg retracts in the plan"),
     "planned_margin": (_STEP, "mm", "stability margin of the plan"),
     "planned_loss_time": (_ONCE, "time unit", "first loss of static stability of the plan, or inf"),
+    "dynamic_loss_time": (_ONCE, "time unit", "loss of dynamic stability of the plan, or inf"),
     "planned_tip": ((*_LEG, "coordinate"), "mm", "commanded tip in the world"),
     "qpos": ((*_STEP, "position"), "mm, 1, rad", "root's position and unit quaternion, joint angles"),
     "centre_of_mass": ((*_STEP, "coordinate"), "mm", "centre of mass in the world"),
@@ -75,7 +77,7 @@ MEASURED = {
 }
 """Further variables of the recording of a physical walk. The recording of a plan has none of them."""
 
-OPTIONAL = ("joint_angle", "tip", "joint_torque", "ground_force")
+OPTIONAL = ("joint_angle", "tip", "dynamic_loss_time", "joint_torque", "ground_force")
 """Variables that recordings of plans of 0.5.0 do not have; the last two need a walk that keeps forces."""
 
 
@@ -231,7 +233,8 @@ def check_recording(recording: xr.Dataset, where: str = "") -> None:
     missing = [name for name in variables if name not in {*recording.variables, *OPTIONAL}]
     missing += [name for name in attributes if name not in recording.attrs]
     if missing:
-        raise InputError(f"{where}not a recording of hexmj: {', '.join(missing)} missing")
+        lacks = ", ".join(missing[:3]) + f" and {len(missing) - 3} more" * (len(missing) > 3)
+        raise InputError(f"{where}not a recording, which `hexmj walk` and `hexmj.record` make; it lacks {lacks}")
 
 
 def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Conditions:
@@ -258,7 +261,8 @@ def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
     """Summarise a recording: times of losses and fall [time units], least margins [mm] and outcomes of the walk."""
     summary: dict[str, Any] = {
         "time units": float(recording.time[-1]),
-        "planned loss": float(recording.planned_loss_time),
+        "kinematic loss": float(recording.planned_loss_time),
+        "dynamic loss": float(recording.get("dynamic_loss_time", np.nan)),
         "least planned margin [mm]": float(recording.planned_margin.min()),
     }
     if "grounded_margin" not in recording:
@@ -281,17 +285,20 @@ def _stride_settings(stride: Stride) -> dict[str, Any]:
     return settings | {name: list(values) for name, values in settings.pop("geometry").items()}
 
 
-def _dataset(
-    planned: PlannedWalk, conditions: Conditions, stride: Stride, title: str, **values: np.ndarray
-) -> Recording:
+def _dataset(planned: PlannedWalk, conditions: Conditions, stride: Stride, title: str, **values: Any) -> Recording:
     """Build a recording from the plan of one start; `values` gives the other variables by name."""
+    margin, pendulum = walk_margin(planned), Pendulum.of(conditions.standing_height, conditions.seconds(stride))
+    so_far = LossesSoFar(pendulum, 1)
+    so_far.add(margin, np.array([len(margin)]))
+    tipped = so_far.losses.dynamic[0]
     values |= {
         "time": planned.time,
         "seconds": planned.time / conditions.vp,
         "velocity": planned.velocity[:, 0],
         **{f"planned_{name}": getattr(planned, name)[:, 0] for name in ("x", "y", "stance")},
-        "planned_margin": walk_margin(planned)[:, 0],
+        "planned_margin": margin[:, 0],
         "planned_loss_time": loss_time(planned)[0],
+        "dynamic_loss_time": tipped * stride.dt if tipped else np.inf,
     }
     coordinates = _filled(TIMES, values) | {"leg": list(LEGS), "coordinate": list("xyz")}
     attributes = {"title": title, **conditions.settings(), **_stride_settings(stride)}

@@ -29,6 +29,9 @@ ENCODINGS: dict[str, dict[str, Any]] = {
 }
 """Suffix of a film's name -> options of the encoder."""
 
+AFTER_FALL = 0.25
+"""Time for which a film shows a fallen body [s of the walk]."""
+
 GROUND = "ground"
 """Name of the ground's texture, if the MJCF has one."""
 
@@ -51,7 +54,7 @@ def render(
         body: description of the recorded body.
 
     Returns:
-        Number of frames. The film lasts from the earliest beginning to the latest end of the recordings.
+        Number of frames. The film ends with the last recording, or `AFTER_FALL` after the last fall.
 
     Raises:
         InputError: no recording or too many, another suffix, a recording without a pose or of another body.
@@ -68,7 +71,7 @@ def render(
     import imageio_ffmpeg
     import mediapy
 
-    begin, end = min(take.begin for take in takes), max(take.end for take in takes)
+    begin, end = min(take.begin for take in takes), max(min(take.end, take.fell + AFTER_FALL) for take in takes)
     frames = max(1, round((end - begin) * film.slow_motion * film.fps))
     times = begin + np.arange(frames) / (film.fps * film.slow_motion)
     overlays = [Overlay(take, film, begin, end) for take in takes]

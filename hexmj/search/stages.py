@@ -100,7 +100,7 @@ class Found:
         least = f"lowest cost {self.cost:.4g}" + (f" ({problem.minimised})" if problem.ties == "later" else "")
         lines = [f"{len(self.history.cost)} evaluations, {self.replayed} candidates from the cache; {least}"]
         if lost := int((self.history.cost.values >= REFUSED).sum()):
-            lines.append(f"{lost} evaluations cost 1: all starts lost stability, or the candidate cannot walk")
+            lines.append(f"evaluations that cost 1: {lost}; all starts lost stability, or the candidate cannot walk")
         return lines
 
 

@@ -358,11 +358,17 @@ def record(blocks: Any, begin: int, end: int, p: Any, k: Any, rules: Any, veloci
 
 
 @jitted
-def lose(blocks: Any, begin: int, end: int, unseen: int, seen: int, p: Any, k: Any, rules: Any) -> None:
-    """Advance blocks `begin` to `end`; their rows `LOST` then hold the first losses after the `unseen` steps."""
+def lose(blocks: Any, begin: int, end: int, unseen: int, seen: int, p: Any, k: Any, rules: Any, pendulum: Any) -> None:
+    """Advance blocks `begin` to `end`; their rows `LOST` then hold the first losses after the `unseen` steps.
+
+    If the gain of the pendulum is above 0, `TIPPED` and `MOST` hold the losses of dynamic stability and the excursions.
+    """
+    feet, stands = np.empty((6, 2)), np.empty(6, np.bool_)
     for b in range(begin, end):
         z = blocks[b]
         for n in range(unseen + seen):
             if n == unseen:
                 z[STEPS * LANES : (STEPS + 1) * LANES] = z[DONE * LANES] + seen  # losses count from here
             _step(z, rules[_ORDER], p, k, rules)
+            if n >= unseen and pendulum[0] > 0.0:
+                _follow_pendulums(z, pendulum, feet, stands, k)

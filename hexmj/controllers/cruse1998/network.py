@@ -19,7 +19,7 @@ from hexmj.legs import MIRROR
 from hexmj.starts import checked_starts, checked_velocities
 from hexmj.threads import run_blocks, thread_count
 from hexmj.timing import Acceleration, Stride
-from hexmj.tipping import Losses, Pendulum
+from hexmj.tipping import STATIC, Losses, Pendulum
 from hexmj.validate import choice, short, whole
 from hexmj.walks import PlannedWalk
 
@@ -224,7 +224,7 @@ class NetworkPlan:
         """See `protocol.Plan`; the call keeps only the present state of each walk in memory."""
         if "_blocks" in vars(self):
             return planned_losses(self, steps, self.threads)
-        return self._losses(steps, Pendulum(0.0, 0.0)).static
+        return self._losses(steps, STATIC).static
 
     def first_dynamic_losses(self, steps: np.ndarray, pendulum: Pendulum) -> Losses:
         """See `protocol.Plan`."""
@@ -245,19 +245,23 @@ class NetworkPlan:
         run_blocks(work, size, block, self.threads)
         return losses
 
-    def first_losses_after(self, unseen: int, seen: int) -> np.ndarray:
-        """Advance by `unseen` steps, then by `seen` steps, and find the first loss within the `seen` steps.
+    def losses_after(self, unseen: int, seen: int, pendulum: Pendulum = STATIC) -> Losses:
+        """Advance by `unseen` steps, then by `seen` steps, and return the first losses within the `seen` steps.
 
-        Returns:
-            Each start's first statically unstable step of the `seen` steps, (start,), counted from time 0; 0 if none.
+        Steps are counted from time 0. Dynamic stability is followed if the gain of the pendulum is above 0.
         """
 
         def work(begin: int, end: int) -> None:
-            kernel.lose(self._blocks, begin, end, unseen, seen, *self.constants)
+            kernel.lose(self._blocks, begin, end, unseen, seen, *self.constants, tuple(pendulum))
 
         run_blocks(work, len(self._blocks), 1, self.threads)
         self.done += unseen + seen
-        return self._read(kernel.LOST, 1)[:, 0]
+        static, dynamic, most = (self._read(row, 1)[:, 0] for row in (kernel.LOST, kernel.TIPPED, kernel.MOST))
+        return Losses(static.astype(int), dynamic.astype(int), most)
+
+    def skip(self, steps: int) -> None:
+        """See `protocol.Plan`."""
+        self.losses_after(steps, 0)
 
     @property
     def tips(self) -> np.ndarray:
