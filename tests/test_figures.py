@@ -188,15 +188,13 @@ def test_a_concatenated_result_names_its_coordinates() -> None:
     assert "friction = 0.7" in head_of(result.sel(friction=0.7))
 
 
-@pytest.mark.parametrize(
-    ("lost", "fell", "times_found"), [(1, np.inf, 2), (np.inf, 1, 0), (1, 1, 0)], ids=["lost", "fell", "both"]
-)
-def test_the_finding_of_a_comparison_follows_its_walks(lost: float, fell: float, times_found: int) -> None:
-    result = xr.concat([made("compare")] * 20, "start", data_vars="minimal")
-    times = 0.0 * result.tilt + xr.where(result.velocity == 0.5, 1.0, np.inf)
-    result = result.assign(planned_loss=times * lost, fall=times * fell)
-    assert head_of(result).count("at V = 0.5") == times_found
-    assert "at V = 0.5" not in head_of(result.assign(weight=result.tilt)), "the intervals of 3 starts overlap"
+def test_the_finding_of_a_comparison_is_the_distance_of_both_plans_from_the_falls() -> None:
+    result = made("compare")
+    away = {"kinematic": 0.37, "dynamic": xr.where(result.velocity == 0.5, 0.12, -0.12), "physical": 0.0}
+    for measure, distance in away.items():
+        for end in ("", "_low", "_high"):
+            result[measure + end] = 0.5 + distance + 0.0 * result.physical
+    assert "FLSS 0.37, FLDS 0.12" in head_of(result)
 
 
 def test_a_notebook_shows_a_figure() -> None:

@@ -159,11 +159,11 @@ def test_a_leg_of_a_puppet_that_is_out_of_reach_keeps_its_angles():
 def test_bad_files_are_refused(walked, tmp_path):
     recording, path = record(walked), tmp_path / "bad.nc"
     xr.Dataset({"flss": ("v", [0.5])}).to_netcdf(path, engine="h5netcdf")
-    with pytest.raises(InputError, match="planned_x"):
+    with pytest.raises(InputError, match="seconds"):
         load_recording(path)
     for bad, name in (
         (recording.drop_vars("fall_time"), "fall_time"),
-        (recording.drop_attrs(deep=False), "friction"),
+        (recording.drop_attrs(deep=False), "title"),
         (recording.drop_vars("seconds"), "seconds"),
     ):
         with pytest.raises(InputError, match=name):

@@ -117,7 +117,8 @@ class LatePlan(WrappedPlan):
         if (steps != steps[0]).any():
             return planned_dynamic_losses(self, steps, pendulum)
         static, dynamic, excursion = self._plan.losses_after(0, int(steps[0]), pendulum)
-        return Losses(*(np.where(step > 0, step - self._late, 0) for step in (static, dynamic)), excursion)
+        static, dynamic = (np.where(step > 0, step - self._late, 0) for step in (static, dynamic))
+        return Losses(static, dynamic, excursion)
 
     def advance(self, steps: int) -> PlannedWalk:
         """Return the next steps; time counts from the end of the warm-up."""
