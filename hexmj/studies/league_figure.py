@@ -90,7 +90,8 @@ def prediction_figure(result: "xr.Dataset") -> "Figure":
         away[measure] = float(np.abs(at[measure].values - falls).mean())
     for name, x, y in zip(at.entrant.values, at.dynamic.values, falls, strict=True):
         if abs(x - y) > NAMED:
-            axes.annotate(in_figure(name), (x, y), (6, -3), textcoords="offset points", fontsize=9)
+            beside: Any = {"xytext": (-7, -3), "ha": "right"} if x < y else {"xytext": (5, -12)}
+            axes.annotate(in_figure(name), (x, y), textcoords="offset points", fontsize=9, **beside)
     axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), aspect="equal")
     axes.set(xlabel="frequency of losses in the plan", ylabel="frequency of falls")
     tidy(axes)
