@@ -134,7 +134,7 @@ class Flss(StudyCommand):
             no_effect(given, ["starts"], "with --precision", {"starts": None})
         if given.measure != "physical":
             if given.precision is not None:
-                raise InputError(f"--precision = {given.precision:g} needs --measure physical; all plans are walked")
+                raise InputError(f"--precision = {given.precision:g} needs --measure physical")
             return super().build(given)
         from hexmj.measures.compare import PhysicalFlss
 

@@ -262,7 +262,7 @@ def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
     summary: dict[str, Any] = {
         "time units": float(recording.time[-1]),
         "kinematic loss": float(recording.planned_loss_time),
-        "dynamic loss": float(recording.get("dynamic_loss_time", np.nan)),
+        "dynamic loss": recording.dynamic_loss_time.item() if "dynamic_loss_time" in recording else None,
         "least planned margin [mm]": float(recording.planned_margin.min()),
     }
     if "grounded_margin" not in recording:
