@@ -41,7 +41,7 @@ def league_figure(result: "xr.Dataset") -> "Figure":
     shown = by_rank(result)
     missing = shown.missing.values > 0
     panels = []
-    for name, title in (MEASURES | {"physical": "Frequency of falls"}).items():
+    for name, title in MEASURES.items():
         starts, fewer = starts_in_words(shown[f"{name}_starts"].max().item()), name != "kinematic" and missing
         panels.append(Panel(f"{title}\n{starts}", shown[name].values, "YlOrRd", fewer, SHARE))
     first = shown.entrant.values[shown.best.sel(measure="physical").values == 1]

@@ -152,7 +152,7 @@ MEASURES = {
     "dynamic": "FLDS",
     "grounded": "Grounded FLSS",
     "carried": "Carried FLSS",
-    "physical": "Physical FLSS",
+    "physical": "Frequency of falls",
 }
 
 
