@@ -131,15 +131,6 @@ def head(figure: "Figure", finding: str, *conditions: str) -> None:
     figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - top / height))
 
 
-def where(v: np.ndarray, holds: np.ndarray) -> str:
-    """Return in words at which of the increasing velocities, (velocity,), something holds, such as "at V = 0.5"."""
-    rows, at = np.flatnonzero(holds), [f"{velocity:g}" for velocity in v[holds]]
-    text = f"at V = {', '.join(at)}" if at else "at no V"
-    if len(at) > 1 and rows[-1] - rows[0] == len(rows) - 1:
-        text = f"from V = {at[0]} " + (f"to {at[-1]}" if rows[-1] < len(v) - 1 else "on")
-    return text.replace(" ", "\N{NO-BREAK SPACE}", 5)
-
-
 def in_figure(text: str) -> str:
     """Escape the dollar signs of a text, since matplotlib would read them as the begin of a formula."""
     return text.replace("$", r"\$")

@@ -46,8 +46,8 @@ CASES = "both, kin., phys., none: starts with both, only a loss, only a fall, ne
 DYNAMIC = ("vp", "standing_height")
 """Options of `PHYSICAL` on which the dynamic measure depends."""
 
-WALKS = {"walks": "walks", "plain_walks": "plain walks"}
-"""Number of walks in a result of --precision -> heading of its column."""
+WALKS = ("walks", "plain_walks")
+"""Numbers of walks in a result of --precision."""
 
 PLAIN = "plain walks: number of walks that random starts would need for an interval of this width"
 
@@ -256,7 +256,7 @@ class Compare(StudyCommand):
         if study.precision is None:
             answers |= zip(names, AGREEMENT, strict=True)
         else:
-            answers |= {name: _whole(key) for key, name in WALKS.items()}
+            answers |= {name.replace("_", " "): _whole(name) for name in WALKS}
         answers["speed"] = _speeds
         yield "Frequency of losses of stability and of falls, with 95 % intervals"
         yield grid(result, axes, columns | {name: name for name in MEASURES})

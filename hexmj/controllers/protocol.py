@@ -24,9 +24,8 @@ class Plan(Protocol):
     A plan that sets the height of the feet may have an attribute `made_for`, the `Conditions` it is made for; physical
     walks under other conditions then raise InputError. A plan may have methods `first_losses(steps)` and
     `first_dynamic_losses(steps, pendulum)`; one of them is called once, at time 0, and gives the result of
-    `planning.planned_losses` or `planned_dynamic_losses` faster. A method `skip(steps)` advances the plan without
-    returning its steps. A plan with an attribute `y` begins after a warm-up: `starts` and `y`, (start, leg) [mm], are
-    the tips after it, not the starts that `begin` received.
+    `planning.planned_losses` or `planned_dynamic_losses` faster. A plan with an attribute `y` begins after a
+    warm-up: `starts` and `y`, (start, leg) [mm], are the tips after it, not the starts that `begin` received.
     """
 
     starts: np.ndarray

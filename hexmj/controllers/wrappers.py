@@ -97,16 +97,16 @@ class LatePlan(WrappedPlan):
 
     def __init__(self, plan: Plan, late: int) -> None:
         """Advance a plan at time 0 by a warm-up of `late` steps."""
-        skip: Any = getattr(plan, "skip", plan.advance)
+        if compiled := getattr(plan, "losses_after", None):  # the 1998 network keeps only its present state
+            compiled(late - 1, 0)
+            self.first_losses, self.first_dynamic_losses = self._first_losses, self._first_dynamic_losses
         while plan.done < late - 1:
-            skip(min(max(1, HELD // len(plan.starts)), late - 1 - plan.done))
+            plan.advance(min(max(1, HELD // len(plan.starts)), late - 1 - plan.done))
         super().__init__(plan)
         last = advanced(plan, 1)
         self.starts, self.y, self.done, self._late = last.x[0], last.y[0], 0, late
         if isinstance(plan, FeedbackPlan):
             self.sense = plan.sense
-        if hasattr(plan, "losses_after"):
-            self.first_losses, self.first_dynamic_losses = self._first_losses, self._first_dynamic_losses
 
     def _first_losses(self, steps: np.ndarray) -> np.ndarray:
         """See `protocol.Plan`."""

@@ -15,7 +15,7 @@ from hexmj.measures.tables import VELOCITY
 from hexmj.paper.measurements import NO_SET
 from hexmj.paper.quantities import kept, main_peak
 from hexmj.phases import PAIRS, circular_mean, wilson_phase
-from hexmj.plotting import SERIES, head, picture, where
+from hexmj.plotting import SERIES, head, picture
 from hexmj.timing import OBSERVATION_TIMES
 from hexmj.walks import spans
 
@@ -172,7 +172,7 @@ def flss_figure(measured: Measurements, number: int, observation_time: str) -> "
         axes.errorbar(one.velocity, one.flss, one.sample_sd, label=label, **look)
     axes.set(xlabel="velocity $V$", ylabel="kinematic FLSS", xlim=(0, 1), ylim=(-0.02, 1.04))
     model = list(curves)[1]
-    lower = where(data.velocity.values, (data.flss.sel(curve=model) < data.flss[0]).values)
+    lower = _where(data.velocity.values, (data.flss.sel(curve=model) < data.flss[0]).values)
     shown = f"Fig. {number}; observation time: {TIMES[observation_time]}; samples: {data.attrs['samples']}"
     head(
         figure, f"{curves[model][0]}: lower FLSS than without coordination {lower}", shown, "bars: standard deviations"
@@ -198,3 +198,12 @@ FIGURES: dict[str, tuple[tuple[str, ...], Draw]] = {
     **{f"footfall-{model}": ((f"{model} footfall",), partial(footfall_diagrams, model=model)) for model in MODELS},
 }
 """Name of each figure -> names of the measurements that it needs, and the function that draws it."""
+
+
+def _where(v: np.ndarray, holds: np.ndarray) -> str:
+    """Return in words at which of the increasing velocities, (velocity,), something holds, such as "at V = 0.5"."""
+    rows, at = np.flatnonzero(holds), [f"{velocity:g}" for velocity in v[holds]]
+    text = f"at V = {', '.join(at)}" if at else "at no V"
+    if len(at) > 1 and rows[-1] - rows[0] == len(rows) - 1:
+        text = f"from V = {at[0]} " + (f"to {at[-1]}" if rows[-1] < len(v) - 1 else "on")
+    return text.replace(" ", "\N{NO-BREAK SPACE}", 5)

@@ -259,10 +259,6 @@ class NetworkPlan:
         static, dynamic, most = (self._read(row, 1)[:, 0] for row in (kernel.LOST, kernel.TIPPED, kernel.MOST))
         return Losses(static.astype(int), dynamic.astype(int), most)
 
-    def skip(self, steps: int) -> None:
-        """See `protocol.Plan`."""
-        self.losses_after(steps, 0)
-
     @property
     def tips(self) -> np.ndarray:
         """See `protocol.SteerablePlan`."""
