@@ -5,6 +5,7 @@ from . import gaits as gaits
 from . import sweep as sweep
 from .body import STICK_INSECT as STICK_INSECT
 from .body import Body as Body
+from .command import Command as Command
 from .conditions import Conditions as Conditions
 from .controllers.cruse1998 import HWS as HWS
 from .controllers.cruse1998 import LDVS as LDVS

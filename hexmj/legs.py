@@ -32,6 +32,28 @@ N4: tuple[tuple[int, ...], ...] = ((), (0,), (1,), (), (3,), (4,))
 
 
 @dataclass(frozen=True)
+class Workspace:
+    """Boxes in which the tips of the legs 1, 2, 3 stand and swing, relative to their origins O_i and lines.
+
+    The unit is half of the step range AEP_0 - PEP_0, 10 mm for the stick insect, which reaches each point of its boxes
+    on the ground and lifted to the step height (`tests/test_command.py`).
+    """
+
+    behind: tuple[float, float, float] = (-2.0, -1.1, -1.1)
+    """Rear ends of the boxes."""
+    ahead: tuple[float, float, float] = (1.2, 0.9, 0.8)
+    """Front ends of the boxes."""
+    inner: tuple[float, float, float] = (0.0, -0.2, 0.0)
+    """Ends of the boxes toward the body; outside of the line is positive."""
+    outer: tuple[float, float, float] = (1.6, 0.9, 1.6)
+    """Ends of the boxes away from the body."""
+
+
+WORKSPACE = Workspace()
+"""Workspace of the stick insect."""
+
+
+@dataclass(frozen=True)
 class Geometry:
     """The lines on which the tips move, seen from above (Fig. 1)."""
 

@@ -67,6 +67,20 @@ class PlannedWalk(Walk):
     to lower the foot. If it is NaN, the body lowers the foot when stance begins."""
     height: np.ndarray = field(kw_only=True)
     """(step, start, leg) height of the tip above the ground [mm]; if NaN, the body itself lifts and lowers the foot."""
+    aep_y: np.ndarray = field(default=None, kw_only=True)  # pyright: ignore[reportAssignmentType]
+    """(step, start, leg) distance of the tip at the end of the present swing from the body axis [mm]; NaN, the default,
+    if the swing moves along the body."""
+    left: np.ndarray = field(default=None, kw_only=True)  # pyright: ignore[reportAssignmentType]
+    """(step, start) velocity to the left as a fraction of V_p; `velocity` is that forward. By default 0."""
+    turn: np.ndarray = field(default=None, kw_only=True)  # pyright: ignore[reportAssignmentType]
+    """(step, start) yaw rate, counterclockwise [rad / time unit]; by default 0."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        steps = np.shape(self.velocity)
+        for name, value, shape in ("aep_y", np.nan, self.stance.shape), ("left", 0.0, steps), ("turn", 0.0, steps):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.broadcast_to(value, shape))
 
 
 def extent(walk: Walk) -> str:
@@ -78,7 +92,7 @@ def extent(walk: Walk) -> str:
     return f"{steps} steps{end}, {starts} start{'s' * (starts != 1)}, V = {' to '.join(ends)}"
 
 
-PLANNED = ("x", "y", "stance", "aep", "height")
+PLANNED = ("x", "y", "stance", "aep", "aep_y", "height")
 """Names of the arrays (step, start, leg) of a `PlannedWalk`."""
 
 AnyWalk = TypeVar("AnyWalk", bound=Walk)

@@ -96,9 +96,9 @@ def advanced(plan: Plan, steps: int) -> PlannedWalk:
     walk = copied(plan.advance(steps))
     if (shape := walk.stance.shape) != (steps, starts, len(LEGS)) or plan.done != before + steps:
         raise InputError(f"advance({steps}) at step {before} returned the shape {shape} and ended at step {plan.done}")
-    for name in ("time", "velocity", "x", "y", "aep", "height"):
+    for name in ("time", "velocity", "x", "y", "aep", "aep_y", "height"):
         values = getattr(walk, name)
-        bad = np.isinf(values) if name in ("aep", "height") else ~np.isfinite(values)
+        bad = np.isinf(values) if name in ("aep", "aep_y", "height") else ~np.isfinite(values)
         if bad.any():
             at = np.argwhere(bad)[0]
             raise InputError(f"{name} is {values[tuple(at)]} in {place(walk, at, before)}; expected a finite number")

@@ -24,8 +24,10 @@ class Plan(Protocol):
     A plan that sets the height of the feet may have an attribute `made_for`, the `Conditions` it is made for; physical
     walks under other conditions then raise InputError. A plan may have methods `first_losses(steps)` and
     `first_dynamic_losses(steps, pendulum)`; one of them is called once, at time 0, and gives the result of
-    `planning.planned_losses` or `planned_dynamic_losses` faster. A plan with an attribute `y` begins after a
-    warm-up: `starts` and `y`, (start, leg) [mm], are the tips after it, not the starts that `begin` received.
+    `planning.planned_losses` or `planned_dynamic_losses` faster. A plan with an attribute `y` begins elsewhere, after
+    a warm-up or on other lines: `starts` and `y`, (start, leg) [mm], are its tips, not the starts that `begin`
+    received. A plan with a method `set_velocity(velocity)` walks at V_r = `velocity`, (start,), from the next step on;
+    commands that change need it.
     """
 
     starts: np.ndarray
@@ -158,6 +160,24 @@ class SteerableController(Controller, Protocol):
 
         The acceleration begins only with `slow_down` or `restart`.
         """
+        ...
+
+
+@runtime_checkable
+class CommandedPlan(Plan, Protocol):
+    """A plan that follows a command (`hexmj.Command`), the same for all of its starts."""
+
+    def follow(self, command: np.ndarray) -> None:
+        """Walk by `command`, (3,), from the next step on: forward, left [V_p] and turn [rad / time unit]."""
+        ...
+
+
+@runtime_checkable
+class CommandedController(Controller, Protocol):
+    """A controller that plans by a command itself; all others are steered, see `steered.Steered`."""
+
+    def begin_commanded(self, starts, command, stride, threads=None) -> CommandedPlan:
+        """Return a plan that walks by `command`, (3,), from time 0; the other arguments are those of `begin`."""
         ...
 
 

@@ -26,6 +26,8 @@ class Step:
     """Distance of the tips from the body axis, left positive [mm]; by default that of the legs' lines."""
     aep: ArrayLike | None = None
     """Tip at the end of the present swing, on the leg's own axis [mm]; by default AEP_0."""
+    aep_y: ArrayLike | None = None
+    """Distance of that tip from the body axis [mm]; by default, the swing moves along the body."""
     height: ArrayLike | None = None
     """Height of the tips above the ground [mm]; where NaN, the default, the body itself lifts and lowers the foot."""
 
@@ -59,7 +61,7 @@ class StepwisePlan:
         """
         stride, shape = self.stride, (steps, *self.starts.shape)
         v = np.array(commanded_velocities(self.velocity, self.age, steps, stride, self.acceleration))
-        defaults = {"y": stride.geometry.y, "aep": stride.aep0, "height": np.nan}
+        defaults = {"y": stride.geometry.y, "aep": stride.aep0, "aep_y": np.nan, "height": np.nan}
         planned = {name: np.full(shape, defaults.get(name, 0.0)) for name in PLANNED} | {"stance": np.ones(shape, bool)}
         for n, now in enumerate(v):
             step = self.step(now.copy())
@@ -75,6 +77,10 @@ class StepwisePlan:
         self.done, self.age = self.done + steps, self.age + steps
         time = np.arange(self.done - steps + 1, self.done + 1) * stride.dt
         return PlannedWalk(time, v, **planned, geometry=stride.geometry)
+
+    def set_velocity(self, velocity: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        self.velocity = velocity
 
 
 def stepwise(

@@ -60,6 +60,10 @@ class WrappedPlan:
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
         self._plan, self.made_for = plan, getattr(plan, "made_for", None)
 
+    def set_velocity(self, velocity: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        self._plan.set_velocity(velocity)
+
     def advance(self, steps: int) -> PlannedWalk:
         """See `protocol.Plan`."""
         walk = self._plan.advance(steps)

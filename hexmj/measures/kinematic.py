@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.command import Command
 from hexmj.conditions import Conditions
-from hexmj.controllers.planning import advanced, begin, check_velocities, first_dynamic_losses, first_losses
+from hexmj.controllers.planning import advanced, check_velocities, first_dynamic_losses, first_losses
 from hexmj.controllers.protocol import Controller, settings_of
+from hexmj.controllers.steered import begin
 from hexmj.errors import InputError
 from hexmj.io import attributes
 from hexmj.measures.tables import WalkSettings, frequency_table, losses_by_sample, observed, settings
@@ -43,7 +45,7 @@ Planned = Literal["kinematic", "dynamic"]
 def walk(
     starts: ArrayLike,
     controller: Controller,
-    velocity: ArrayLike,
+    velocity: ArrayLike | Command | Sequence[Command],
     duration: float,
     *,
     stride: Stride = STRIDE,
@@ -71,7 +73,7 @@ def walk(
 def first_loss(
     starts: ArrayLike,
     controller: Controller,
-    velocity: ArrayLike,
+    velocity: ArrayLike | Command | Sequence[Command],
     duration: ArrayLike,
     *,
     stride: Stride = STRIDE,
@@ -100,7 +102,7 @@ class DynamicLosses(NamedTuple):
 def dynamic_losses(
     starts: ArrayLike,
     controller: Controller,
-    velocity: ArrayLike,
+    velocity: ArrayLike | Command | Sequence[Command],
     duration: ArrayLike,
     *,
     conditions: Conditions = Conditions(),

@@ -1,5 +1,6 @@
 """Physical walks: `physical_walk` keeps every step in memory, `physical_outcomes` only the outcome of each start."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
@@ -7,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexmj.command import Command
 from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.planning import advanced, begin, check_same
+from hexmj.controllers.planning import advanced, check_same
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan
+from hexmj.controllers.steered import begin
 from hexmj.measures.kinematic import dynamic_losses
 from hexmj.physics.outcomes import EffortSoFar, Outcomes, OutcomesSoFar, WalkSoFar, grounded
 from hexmj.physics.pushes import Push
@@ -71,7 +74,7 @@ class PhysicalWalk:
 def physical_walk(
     starts: ArrayLike,
     controller: Controller,
-    velocity: ArrayLike,
+    velocity: ArrayLike | Command | Sequence[Command],
     duration: float,
     *,
     conditions: Conditions = Conditions(),
@@ -142,7 +145,7 @@ def physical_walk_of_plan(
 def physical_outcomes(
     settled: Settled,
     controller: Controller,
-    velocity: ArrayLike,
+    velocity: ArrayLike | Command | Sequence[Command],
     duration: float,
     *,
     starts: np.ndarray | None = None,
@@ -197,7 +200,7 @@ def _until_fall(fall: np.ndarray, planned: PlannedWalk, followed: list[PlannedWa
     steps = sum(len(part.time) for part in followed)
     walk = copied(joined([*followed, part_of(planned, slice(steps, None))]))
     over = walk.time[:, None] - stride.dt >= fall
-    for tips in (walk.x, walk.y, walk.aep, walk.height):
+    for tips in (walk.x, walk.y, walk.aep, walk.aep_y, walk.height):
         tips[over] = np.nan
     walk.stance[over] = False
     return walk

@@ -55,7 +55,7 @@ class TipTargets:
             Tips in the root frame, (n, substep, leg, 3): forward, left and up [mm].
         """
         tips = np.empty((len(ids), len(plan.time) * self._substeps, 6, 3))
-        arrays = plan.x, plan.y, plan.stance, plan.aep, plan.height
+        arrays = plan.x, plan.y, plan.stance, plan.aep, plan.aep_y, plan.height
         planned = tuple(map(np.ascontiguousarray, arrays))  # one memory layout, so that numba compiles once
         last = self._x, self._y, self._stance, self._lift, self._height
         _follow(planned, ids, last, self._substeps, self._rates, self._heights, self._origin, tips)
@@ -184,7 +184,7 @@ def _follow(planned: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any,
 
     Unless planned, the height is a smooth function of the phase of the lift. The phase rises to 1 in swing. It is
     lowered to 0 in stance, and over the last `landing` [mm] before the AEP to the share of `landing` that is left."""
-    x, y, stance, aep, own_height = planned
+    x, y, stance, aep, aep_y, own_height = planned
     x_old, y_old, s_old, lift, height_old = last
     rise, sink, landing = rates
     step_height, standing_height = heights
@@ -194,11 +194,13 @@ def _follow(planned: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any,
             phase, height = lift[start, leg], height_old[start, leg]
             for n in range(len(x)):
                 x_to, y_to, end, own = x[n, start, leg], y[n, start, leg], aep[n, start, leg], own_height[n, start, leg]
-                ahead, height_from = x_to >= x_from, height
+                ahead, height_from, aside = x_to >= x_from, height, aep_y[n, start, leg]
                 for sub in range(m):
                     part = (sub + 1.0) / m
                     at = x_from + (x_to - x_from) * part
+                    y_at = y_from + (y_to - y_from) * part
                     left = end - at if ahead else at - end
+                    left = left if np.isnan(aside) else np.hypot(end - at, aside - y_at)
                     goal = 0.0 if s else 1.0 if np.isnan(end) else min(max(left / landing, 0.0), 1.0)
                     phase = min(phase + rise, max(phase - sink, goal))
                     if np.isnan(own):
@@ -207,7 +209,7 @@ def _follow(planned: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any,
                         height = height_from + (own - height_from) * part
                     tip = tips[i, n * m + sub, leg]
                     tip[0] = origin[leg] + at
-                    tip[1] = y_from + (y_to - y_from) * part
+                    tip[1] = y_at
                     tip[2] = height - standing_height
                 x_from, y_from, s = x_to, y_to, stance[n, start, leg]
             lift[start, leg], height_old[start, leg] = phase, height

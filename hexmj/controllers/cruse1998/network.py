@@ -282,6 +282,12 @@ class NetworkPlan:
             self._write(row, np.where(which[:, None], values, self._read(row)))
         self.slow_down(which)
 
+    def set_velocity(self, velocity: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        for row in (kernel.V, kernel.V_FINAL):
+            self._write(row, velocity[:, None], 1)
+        self.slow = self.final = velocity
+
     def slow_down(self, which: np.ndarray) -> None:
         """See `protocol.SteerablePlan`."""
         for row, values in {kernel.V: self.slow, kernel.DONE: 0.0}.items():
