@@ -11,14 +11,17 @@ import xarray as xr
 from hexmj.bodies.kinematics import standing_tips
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import ROOT_QPOS, STICK_INSECT, Body
+from hexmj.command import Command
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
+from hexmj.controllers.steered import pace
 from hexmj.errors import InputError
 from hexmj.files import read_netcdf, write_netcdf
 from hexmj.legs import LEGS
 from hexmj.measures import tables
 from hexmj.measures.compare import REPORTED
 from hexmj.measures.kinematic import walk as planned_walk
+from hexmj.measures.path import path_outcomes, poses_of
 from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.physics.foot_path import TipTargets, hold
 from hexmj.progress import progress_bar
@@ -87,7 +90,11 @@ class Start:
 
     controller: Controller
     velocity: float = 0.3
-    """Velocity V_r as a fraction of V_p, 0 <= V < 1."""
+    """Velocity V_r as a fraction of V_p, 0 <= V < 1; with `left` or `turn`, the velocity forward."""
+    left: float = 0.0
+    """Velocity to the left as a fraction of V_p; negative to the right."""
+    turn: float = 0.0
+    """Yaw rate, counterclockwise seen from above [rad / time unit]."""
     seed: int = 0
     """Seed of the random starts."""
     start: int = 0
@@ -98,6 +105,11 @@ class Start:
     acceleration: Acceleration | None = None
     conditions: Conditions = Conditions()
 
+    @property
+    def command(self) -> Command:
+        """The command of the walk."""
+        return Command(self.velocity, self.left, self.turn)
+
     def walked(self, threads: int | None = None) -> PhysicalWalk:
         """Simulate the physical walk and return it."""
         with progress_bar("walking") as progress:
@@ -107,19 +119,24 @@ class Start:
     def recorded(self, physical: bool, title: str, threads: int | None = None) -> Recording:
         """Return a recording of the physical walk if `physical`, otherwise of the plan."""
         if physical:
-            return record(self.walked(threads), title=title)
-        return record_plan(self._call(planned_walk, threads=threads), self.conditions, self.stride, title=title)
+            recording = record(self.walked(threads), title=title)
+        else:
+            plan = self._call(planned_walk, threads=threads)
+            recording = record_plan(plan, self.conditions, self.stride, title=title)
+        return recording if self.command.velocity is not None else recording.assign_attrs(command=self.command.parts[0])
 
     def _call(self, walk: Callable[..., Any], **options: Any) -> Any:
         """Call `physical_walk` or `planned_walk` with the fields of this start, except its conditions."""
-        time = observation_duration(self.observation_time, self.velocity, self.stride, self.acceleration)
+        v = pace(self.command, self.stride) if self.command.velocity is None else self.velocity
+        time = observation_duration(self.observation_time, v, self.stride, self.acceleration)
         start, options = draw_start(self.start, self.seed, self.stride), {"stride": self.stride} | options
-        return walk(start, self.controller, self.velocity, float(time), acceleration=self.acceleration, **options)
+        command = self.velocity if self.command.velocity is not None else self.command
+        return walk(start, self.controller, command, float(time), acceleration=self.acceleration, **options)
 
     def settings(self, **controllers: Controller) -> dict[str, Any]:
         """Return the settings with which the walk can be repeated, as plain data."""
         walks = tables.settings(controllers, self.observation_time, 1, self.seed, self.stride, self.acceleration)
-        own = {"velocity": self.velocity, "start": self.start}
+        own = {name: getattr(self, name) for name in ("velocity", "left", "turn", "start")}
         return own | walks | {"conditions": self.conditions.settings()}
 
 
@@ -163,7 +180,7 @@ def record_plan(
 ) -> Recording:
     """Record the plan of one start, shown by a body that follows it exactly: a puppet, without physics.
 
-    The root moves with V_r at the standing height without tilt, and the joints reach the planned tips. The recorded
+    The root moves by the plan at the standing height without tilt, and the joints reach the planned tips. The recorded
     centre of mass is the root, the paper's O. A leg that cannot reach its tip keeps its last angles.
 
     Args:
@@ -185,8 +202,11 @@ def record_plan(
     compiled = compile_body(conditions)
     tips, first = _lifted_tips(planned, conditions, stride)
     root = np.zeros((steps, ROOT_QPOS))
-    root[:, 0] = np.cumsum(planned.velocity[:, 0]) * stride.dt
-    root[:, 2:4] = conditions.standing_height + compiled.foot_radius, 1.0
+    turn = planned.turn[:, 0] * stride.dt
+    angle = np.cumsum(turn)
+    way = np.cumsum((planned.velocity[:, 0] + 1j * planned.left[:, 0]) * np.exp(1j * (angle - turn / 2))) * stride.dt
+    root[:, 0], root[:, 1], root[:, 2] = way.real, way.imag, conditions.standing_height + compiled.foot_radius
+    root[:, 3], root[:, 6] = np.cos(angle / 2), np.sin(angle / 2)
     joints, reachable = compiled.inverse(tips)
     standing, stands = compiled.inverse(first)
     if not stands.all():
@@ -195,7 +215,8 @@ def record_plan(
     if not reachable.all():
         hold(joints, standing)
     pose = {"qpos": np.concatenate([root, joints.reshape(steps, -1)], axis=1), "centre_of_mass": root[:, :3]}
-    return _dataset(planned, conditions, stride, title, planned_tip=root[:, None, :3] + tips, **pose)
+    tips = root[:, None, :3] + rotated(root[:, None, 3:7], tips)
+    return _dataset(planned, conditions, stride, title, planned_tip=tips, **pose)
 
 
 def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
@@ -271,6 +292,12 @@ def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
     summary["grounded loss"] = float(recording.grounded_loss_time)
     summary["least grounded margin [mm]"] = float(recording.grounded_margin.min())
     summary["carried loss"] = float(recording.carried_loss_time)
+    if (command := recording.attrs.get("command")) is not None:
+        time, poses = recording.time.values, poses_of(recording.qpos.values[:, None])
+        forward, left, turn = map(float, command)
+        path = path_outcomes(poses, time - time[0], Command(forward, left, turn))
+        summary["distance to the path [mm]"] = path.path_distance.item()
+        summary["heading error [rad]"] = path.heading_error.item()
     summary["fall"] = float(recording.fall_time)
     summary["fell on"] = recorded_conditions(recording).body.trunk[part] if part >= 0 else None
     for name in REPORTED:
@@ -326,7 +353,10 @@ def _with_pose(recording: Recording, conditions: Conditions) -> Recording:
 
 def _lifted_tips(planned: PlannedWalk, conditions: Conditions, stride: Stride) -> tuple[np.ndarray, np.ndarray]:
     """Return planned tips of one start in the root frame after each step, (step, leg, 3), and at 0, (leg, 3) [mm]."""
-    x = planned.x[0] + planned.velocity[0, :, None] * stride.dt  # all legs retract in the first step
-    tips = TipTargets(x, conditions, stride).follow(planned, np.array([0]))[0]
-    m = conditions.substeps(stride)
-    return tips[m - 1 :: m], standing_tips(x[0], conditions.standing_height, stride)
+    ahead, left, turn = (values[0, :, None] for values in (planned.velocity, planned.left, planned.turn))
+    x = planned.x[0] + ahead * stride.dt - turn * stride.dt * planned.y[0]  # all legs retract in the first step
+    y = planned.y[0] + left * stride.dt + turn * stride.dt * (planned.x[0] + np.array(stride.geometry.origin))
+    tips = TipTargets(x, conditions, stride, y).follow(planned, np.array([0]))[0]
+    m, first = conditions.substeps(stride), standing_tips(x[0], conditions.standing_height, stride)
+    first[:, 1] = y[0]
+    return tips[m - 1 :: m], first
