@@ -222,7 +222,7 @@ def view_session() -> Any:
     starts = hexmj.draw_starts(2, seed=1)
     session = LiveSession(LiveWalk(hexmj.LDVS, 0.3, starts[0]), 0, starts.__getitem__)
     session.tick(0.1)
-    session.attempt(lambda: session.walk.steer(velocity=0.5))
+    session.attempt(lambda: session.walk.steer(0.5))
     session.attempt(lambda: session.walk.push(4.0))
     return vars(session.tick(0.1))
 

@@ -7,18 +7,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hexmj.command import Command
 from hexmj.conditions import Conditions
 from hexmj.controllers import Step, stepwise
 from hexmj.controllers.cruse1998 import HWS, LDVS, UNCOORDINATED
 from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import load_controller
+from hexmj.controllers.steered import Steered
 from hexmj.errors import InputError
 from hexmj.measures.kinematic import walk
 from hexmj.measures.physical import physical_walk
 from hexmj.starts import draw_starts
 from hexmj.view import desktop
-from hexmj.view.live import LiveWalk, SteeredPlan
+from hexmj.view.live import LiveWalk
 from hexmj.view.session import LYING_TIME, LiveSession
 
 STARTS = draw_starts(8, seed=1)
@@ -55,7 +57,7 @@ def test_a_changed_velocity_and_controller_continue_from_the_current_legs():
     live = begun(velocity=0.2)
     live.advance(0.2)
     before, seconds = live.moment, live.moment.seconds
-    assert live.steer(velocity=0.6)
+    assert live.steer(0.6)
     assert live.steer(controller=HWS)
     live.advance(0.02)
     after = live.trace
@@ -66,17 +68,20 @@ def test_a_changed_velocity_and_controller_continue_from_the_current_legs():
 
 def test_a_plan_that_is_handed_over_is_the_new_controller_s():
     """At time 0, it is the kinematic walk of the new controller."""
-    plan = SteeredPlan(UNCOORDINATED, STARTS[:1], 0.3, begun().stride)
-    assert plan.hand_over(LDVS, 0.5)
+    plan = Steered(UNCOORDINATED).begin_commanded(STARTS[:1], np.array([0.3, 0.0, 0.0]), begun().stride)
+    plan.follow(np.array([0.5, 0.0, 0.0]))
+    assert plan.hand_over(LDVS)
     np.testing.assert_array_equal(plan.advance(400).x, walk(STARTS[:1], LDVS, 0.5, 40.0).x)
 
 
 def test_a_controller_that_cannot_continue_begins_again():
     live = begun(SensoryFeedback(LDVS))
     live.advance(0.1)
-    assert not live.steer(velocity=0.5)
+    assert live.steer(0.5)
+    live.advance(0.1)
+    assert not live.steer(controller=HWS)
     assert live.moment.seconds < 0.01
-    assert live.velocity == 0.5
+    assert live.command == Command(0.5)
     live.begin(conditions=Conditions(vp=160.0))
     assert live.moment.seconds < 0.01
     assert live.advance(0.1).qpos[0] > 3.0
@@ -87,14 +92,14 @@ def test_bad_arguments_change_nothing(monkeypatch):
     live.advance(0.1)
     before = live.moment
     for change, argument in (
-        (lambda: live.steer(velocity=1.5), "V"),
+        (lambda: live.steer(1.5), "forward"),
         (lambda: live.advance(-1.0), "seconds"),
         (lambda: live.advance(np.nan), "seconds"),
         (lambda: live.push(1e9), "impulse"),
     ):
         with pytest.raises(InputError, match=argument):
             change()
-    assert (live.velocity, live.controller) == (0.4, LDVS)
+    assert (live.command, live.controller) == (Command(0.4), LDVS)
     assert live.moment is before
     monkeypatch.setattr("hexmj.view.live.MOST_STEPS", 5)
     with pytest.raises(InputError, match="steps"):
@@ -109,7 +114,7 @@ class Stumbles:
 
     def begin(self, starts, velocity, stride, acceleration=None, threads=None):
         def step(v):
-            if velocity > 0.5:
+            if (v > 0.5).any():
                 raise ValueError("too fast")
             return Step(starts, np.ones(6, dtype=bool))
 
@@ -121,10 +126,10 @@ def test_after_a_failing_begin_the_last_walk_continues():
     live.advance(0.1)
     before = live.moment
     with pytest.raises(ValueError, match="too fast"):
-        live.steer(controller=Stumbles(), velocity=0.6)
+        live.steer(0.6, Stumbles())
     assert live.moment is before
     assert live.advance(0.1).seconds == pytest.approx(before.seconds + 0.1, abs=0.01)
-    assert (live.velocity, live.controller) == (0.4, LDVS)
+    assert (live.command, live.controller) == (Command(0.4), LDVS)
 
 
 def test_the_desktop_viewer_shows_why_a_key_is_refused(monkeypatch):
@@ -133,14 +138,14 @@ def test_the_desktop_viewer_shows_why_a_key_is_refused(monkeypatch):
 
     @contextmanager
     def window(conditions, on_key):
-        on_key(desktop.UP)
+        on_key(ord("W"))
         yield SimpleNamespace(is_running=lambda: len(shown) < 2)
 
     monkeypatch.setattr(desktop, "_window", window)
     monkeypatch.setattr(desktop, "_show", lambda *what: shown.append(what[-1]))
     desktop.view_live(session)
     assert all("too fast" in message for message in shown)
-    assert session.walk.velocity == 0.5
+    assert session.walk.command == Command(0.55)
 
 
 def test_a_push_moves_the_insect_to_its_side():

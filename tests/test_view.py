@@ -55,8 +55,10 @@ def test_the_page_is_served_and_its_sliders_change_the_walk(view):
     for _ in range(5):
         view.step(0.02)
     assert walk.moment.seconds > 0.09
-    view.controls["V"].value = 0.6
+    view.controls["forward"].value = 0.6
     until(view, lambda: walk.moment.velocity == 0.6)
+    view.controls["turn"].value = 0.005
+    until(view, lambda: walk.moment.qpos[6] > 0.05)
     view.controls["p1_i"].value = 3.0
     until(view, lambda: walk.controller.weights.p1_i == 3.0)
     seconds, charted = walk.moment.seconds, list(view._recent)
@@ -75,7 +77,7 @@ def test_the_page_is_served_and_its_sliders_change_the_walk(view):
 def test_sliders_reach_unusual_values_and_only_symmetric_weights_have_some(controller, velocity, vp):
     view = view_of(controller, velocity, STARTS[0], Conditions(vp=vp))
     try:
-        assert (view.controls["V"].value, view.controls["V_p"].value) == (velocity, vp)
+        assert (view.controls["forward"].value, view.controls["V_p"].value) == (velocity, vp)
         assert ("p1_i" in view.controls) == (controller is LDVS)
     finally:
         view.server.stop()

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
 
+from hexmj import command
 from hexmj.cli.command import Answer, Command
 from hexmj.cli.measures import PHYSICAL
 from hexmj.cli.options import Output, Planning, Threads, build, controller, no_effect
@@ -20,7 +21,7 @@ from hexmj.timing import Stride
 if TYPE_CHECKING:
     from hexmj.replay.recording import Recording, Start
 
-WALKS: dict[str, Any] = {"controller": "ldvs", "velocity": 0.3, "seed": 0, "start": 0, "beside": None}
+WALKS: dict[str, Any] = {"controller": "ldvs", "velocity": 0.3, "left": 0.0, "turn": 0.0, "seed": 0, "start": 0}
 """Option that has no effect on recordings -> its default."""
 
 END = "Press Ctrl-C to stop."
@@ -60,8 +61,7 @@ class Render(Command):
         if len(given.recordings) > MOST_PANELS:
             raise InputError(f"{len(given.recordings)} recordings; expected 1 to {MOST_PANELS}")
         if given.recordings:
-            names = ["controller", "velocity", "seed", "start", "beside", "feedback", *PHYSICAL]
-            no_effect(given, names, "on recordings", WALKS)
+            no_effect(given, [*WALKS, "beside", "feedback", *PHYSICAL], "on recordings", WALKS | {"beside": None})
         shown = [load_recording(path) for path in given.recordings]
         start = None if shown else build(Start, given)
         if start and given.beside not in (None, "planned"):
@@ -190,7 +190,11 @@ class ViewOptions:
     recording: Path | None = None
     """A recording (recording.nc of `hexmj walk`); without one, an insect walks live."""
     velocity: float = 0.3
-    """Velocity V_r at the beginning, a fraction of V_p, 0 <= V < 1."""
+    """Velocity forward at the beginning, as a fraction of V_p."""
+    left: float = 0.0
+    """Velocity to the left at the beginning, as a fraction of V_p."""
+    turn: float = 0.0
+    """Yaw rate at the beginning [rad / time unit]."""
     seed: int = 0
     """Seed of the random starts."""
     start: int = 0
@@ -218,8 +222,7 @@ class View(Command):
         if given.recording is None:
             self.live(given, desktop)
         else:
-            names = ["controller", "velocity", "seed", "start", "feedback", *PHYSICAL]
-            no_effect(given, names, "on a recording", WALKS)
+            no_effect(given, [*WALKS, "feedback", *PHYSICAL], "on a recording", WALKS)
             self.recording(given, desktop)
 
     def live(self, given: SimpleNamespace, desktop: bool) -> None:
@@ -238,7 +241,8 @@ class View(Command):
         if not desktop:
             check_port(given.host, given.port)  # raises before the insect settles
         with progress_bar("settling"):
-            walk = LiveWalk(planned, given.velocity, starts(given.start), conditions(given))
+            twist = command.Command(given.velocity, given.left, given.turn)
+            walk = LiveWalk(planned, twist, starts(given.start), conditions(given))
         session = LiveSession(walk, given.start, starts)
         if desktop:
             from hexmj.view.desktop import KEYS, view_live

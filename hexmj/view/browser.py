@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.mjcf import compile_body
+from hexmj.command import Command
 from hexmj.controllers.cruse1998 import Cruse1998, Symmetric
 from hexmj.errors import InputError, without_extra
 from hexmj.legs import LEGS
@@ -38,6 +39,13 @@ RANGES = {
     "p34_i": (-20.0, 40.0), "p31_c": (-20.0, 20.0), "p32_c": (0.0, 2.0),
 }  # fmt: skip
 """Ranges of the sliders of symmetric weights, wide enough for both published weight sets."""
+
+COMMAND = {
+    "forward": (0.95, 0.01, "velocity forward [V_p]"),
+    "left": (0.5, 0.01, "velocity to the left [V_p]"),
+    "turn": (0.02, 0.0005, "yaw rate, counterclockwise [rad / time unit]"),
+}
+"""Slider of the command -> its maximum, step and hint."""
 
 SWITCHES = ("p2", "p4_i")
 """Weights that are on (1) or off (0), and have check boxes instead of sliders."""
@@ -141,14 +149,17 @@ class BrowserView:
         gui, walk = self.server.gui, self.session.walk
         self._readout = gui.add_markdown("")
         with gui.add_folder("Walk"):
-            v, now = walk.velocity, walk.conditions.vp
-            velocity = gui.add_slider("V", 0.0, max(0.95, v), 0.01, v, hint="changes with the next step")
-            velocity.on_update(lambda _: self._change(lambda walk: walk.steer(velocity=velocity.value)))
+            now, found = walk.conditions.vp, walk.command.parts[0]
+            for (name, (most, step, hint)), value in zip(COMMAND.items(), found.tolist(), strict=True):
+                most = max(most, abs(value))
+                self.controls[name] = gui.add_slider(name, -most, most, step, value, hint=hint)
+                self.controls[name].on_update(lambda _: self._change(self._steer))
+            gui.add_button("Halt").on_click(lambda _: self._halt())
             vp = gui.add_slider("V_p [mm/s]", min(20, now), max(400, now), 5, now, hint="restarts the walk")
             vp.on_update(
                 lambda _: self._change(lambda walk: walk.begin(conditions=replace(walk.conditions, vp=float(vp.value))))
             )
-            self.controls |= {"V": velocity, "V_p": vp}
+            self.controls["V_p"] = vp
             paused = gui.add_checkbox("pause", False)
             paused.on_update(lambda _: setattr(self.session, "paused", paused.value))
             restarts = {"same start": self.session.begin, "next start": self.session.begin_next}
@@ -161,6 +172,16 @@ class BrowserView:
         if isinstance(controller, Cruse1998) and isinstance(controller.weights, Symmetric):
             with gui.add_folder("Weights of the network", expand_by_default=False):
                 self._make_weights(controller, controller.weights)
+
+    def _steer(self, walk: LiveWalk) -> None:
+        """Let the walk follow the sliders of the command."""
+        forward, left, turn = (float(self.controls[name].value) for name in COMMAND)
+        walk.steer(Command(forward, left, turn))
+
+    def _halt(self) -> None:
+        for name in COMMAND:
+            self.controls[name].value = 0.0
+        self._change(self._steer)
 
     def _make_weights(self, controller: Cruse1998, weights: Symmetric) -> None:
         gui, handles = self.server.gui, {}

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.mjcf import compile_body
+from hexmj.command import Command
 from hexmj.conditions import Conditions
 from hexmj.errors import RenderingError
 from hexmj.rendering.scene_marks import mark_centre_of_mass, mark_planned_tips, mark_support
@@ -21,11 +22,23 @@ from hexmj.replay.take import Take, margin_in_words, support_on_ground
 from hexmj.view.session import IMPULSE, LYING_TIME, LiveSession, ticks
 
 PAUSE = "space pauses"
-KEYS = f"{PAUSE}, up and down change V, left and right push, enter takes the next start"
+KEYS = (
+    f"{PAUSE}; W and S change the velocity forward, A and D that to the left, Q and E the yaw rate; X halts; left and"
+    " right push; enter takes the next start"
+)
 """Help on the keys of a recording (PAUSE) and of a live walk (KEYS)."""
 
-SPACE, ENTER, RIGHT, LEFT, DOWN, UP = 32, 257, 262, 263, 264, 265
-"""GLFW's codes of the keys."""
+SPACE, ENTER, RIGHT, LEFT = 32, 257, 262, 263
+"""GLFW's codes of the keys; those of letters are their characters."""
+
+MOST = np.array([0.95, 0.5, 0.02])
+"""Maximum of each component of the command."""
+
+STEERS: dict[str, tuple[float, float, float]] = {
+    **{"W": (0.05, 0.0, 0.0), "A": (0.0, 0.05, 0.0), "Q": (0.0, 0.0, 0.001)},
+    **{"S": (-0.05, 0.0, 0.0), "D": (0.0, -0.05, 0.0), "E": (0.0, 0.0, -0.001)},
+}
+"""Key -> change of the command."""
 
 
 def screen() -> bool:
@@ -40,7 +53,7 @@ def view_live(session: LiveSession) -> None:
         moment = session.tick(passed)
         seen = moment.feet[:, :2], moment.stance, moment.centre_of_mass, moment.planned_tips
         state = f"fell on {walk.fell_on}" if walk.fell_on else margin_in_words(moment.margin)
-        text = f"V = {walk.velocity:.2f}, {state}"
+        text = "forward {:.2f}, left {:.2f}, turn {:.4f}".format(*walk.command.parts[0]) + f", {state}"
         _show(window, walk.conditions, moment.qpos, moment.margin, seen, text, session.message)
 
 
@@ -73,13 +86,15 @@ def _opened(conditions: Conditions, press: Callable[[int], object]) -> Iterator[
 
 def _press(session: LiveSession, key: int) -> None:
     """Change the live walk as the pressed key asks for, see `KEYS`."""
-    walk, change = session.walk, {UP: 0.05, DOWN: -0.05}.get(key)
+    walk, change = session.walk, STEERS.get(chr(key))
     if key == SPACE:
         session.paused = not session.paused
     elif key == ENTER:
         session.begin_next()
+    elif chr(key) == "X":
+        walk.steer(Command(0.0))
     elif change:
-        walk.steer(velocity=float(np.clip(walk.velocity + change, 0.0, 0.95)))
+        walk.steer(Command(*np.clip(walk.command.parts[0] + change, -MOST, MOST).tolist()))
     elif key in (LEFT, RIGHT):
         walk.push(IMPULSE if key == LEFT else -IMPULSE)
 

@@ -1,24 +1,26 @@
-"""Live walk of one insect, whose controller, velocity and conditions can change while it walks."""
+"""Live walk of one insect, whose controller, command and conditions can change while it walks."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from typing import cast
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from hexmj.body import ROOT_QPOS
+from hexmj.command import Command
 from hexmj.conditions import Conditions, check_ground
-from hexmj.controllers.planning import begin
-from hexmj.controllers.protocol import Controller, Plan, SteerableController, SteerablePlan
+from hexmj.controllers.protocol import Controller
+from hexmj.controllers.steered import commanded
 from hexmj.errors import InputError
 from hexmj.physics.foot_path import OrdersFromPlan, steps_in_chunk
 from hexmj.physics.outcomes import grounded, measured_walk
 from hexmj.physics.pushes import Push, steps_pushed
 from hexmj.physics.rollout import Chunk, Rollout, next_orders
-from hexmj.physics.settle import settle
+from hexmj.physics.settle import settle_plan
 from hexmj.rotations import rotated
 from hexmj.stability import walk_margin
+from hexmj.starts import checked_starts
 from hexmj.timing import MOST_STEPS, Stride
 from hexmj.validate import leg_last, number, numbers
 from hexmj.walks import PlannedWalk, joined, part_of
@@ -37,7 +39,7 @@ class Moment:
     seconds: float
     """Time since the walk began [s]."""
     velocity: float
-    """Commanded V_r, a fraction of V_p."""
+    """Commanded velocity forward, a fraction of V_p."""
     qpos: np.ndarray
     """(position,) MuJoCo's positions of the root and the joints."""
     feet: np.ndarray
@@ -56,35 +58,6 @@ class Moment:
     """Stability margin of the plan [mm]."""
 
 
-class SteeredPlan:
-    """Plan of one start that another controller can take over; its time goes on when the controller changes."""
-
-    def __init__(self, controller: Controller, starts: np.ndarray, velocity: float, stride: Stride) -> None:
-        """Begin the plan at `starts`, the tips of one start, (1, leg) [mm]."""
-        self.starts, self.stride, self.done = starts, stride, 0
-        self.current: Plan = begin(controller, starts, velocity, stride, threads=1)
-        self.made_for = getattr(self.current, "made_for", None)
-
-    def advance(self, steps: int) -> PlannedWalk:
-        """Return the next `steps` steps of the plan."""
-        walk = self.current.advance(steps)  # `OrdersFromPlan` checks it
-        self.done += steps
-        return replace(walk, time=np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt)
-
-    def hand_over(self, controller: Controller, velocity: float) -> bool:
-        """Let a controller continue at `velocity` (V_r) from the current tips and stance.
-
-        Returns:
-            True if the controller continues; False, without a change, if it or the current plan cannot be steered.
-        """
-        if not (isinstance(controller, SteerableController) and isinstance(self.current, SteerablePlan)):
-            return False
-        plan = cast(SteerablePlan, begin(controller, self.starts, velocity, self.stride, at_speed=True))
-        plan.see(self.current.tips.copy(), self.current.standing.copy())
-        self.current = plan
-        return True
-
-
 class LiveWalk:
     """A physical walk of one insect that is advanced step by step."""
 
@@ -98,7 +71,7 @@ class LiveWalk:
     def __init__(
         self,
         controller: Controller,
-        velocity: float,
+        command: Command | float,
         start: np.ndarray,
         conditions: Conditions = Conditions(),
         stride: Stride = Stride(),
@@ -107,7 +80,7 @@ class LiveWalk:
 
         Args:
             controller: controller that plans the walk.
-            velocity: V_r as a fraction of V_p.
+            command: command that the insect follows, or V_r straight ahead.
             start: tips on their own axes at time 0, (leg,) [mm]; all feet stand.
             conditions: conditions of the walk.
             stride: stride of the plan.
@@ -115,7 +88,7 @@ class LiveWalk:
         Raises:
             InputError: the insect cannot walk with these arguments.
         """
-        self.controller, self.velocity = controller, number("velocity", velocity)
+        self.controller, self.command = controller, _command(command)
         self.start = numbers("start", leg_last(start))
         self.conditions, self.stride = conditions, stride
         self.begin()
@@ -129,8 +102,9 @@ class LiveWalk:
         start = self.start if start is None else numbers("start", leg_last(start))
         conditions = conditions or self.conditions
         check_ground(conditions)
-        settled = settle(start[np.newaxis], conditions, self.stride, threads=1)
-        plan = SteeredPlan(self.controller, settled.starts, self.velocity, self.stride)
+        starts = checked_starts(start[np.newaxis], self.stride)
+        plan: Any = commanded(self.controller).begin_commanded(starts, self.command.parts[0], self.stride, threads=1)
+        settled = settle_plan(plan, conditions, threads=1)
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
         with self._restored_if_it_fails():
             self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
@@ -141,8 +115,8 @@ class LiveWalk:
             self._last_step: PlannedWalk | None = None
             self._walk(2)  # the end of a step is known when the next begins
 
-    def steer(self, *, velocity: float | None = None, controller: Controller | None = None) -> bool:
-        """Change V_r, the controller, or both, from the next step on.
+    def steer(self, command: Command | float | None = None, controller: Controller | None = None) -> bool:
+        """Change the command, the controller, or both, from the next step on.
 
         If the controller cannot continue from the current tips and stance, the walk restarts at its start.
 
@@ -150,13 +124,15 @@ class LiveWalk:
             True if the walk continues, False if it restarts.
 
         Raises:
-            InputError: a bad velocity or controller; the walk before the call continues.
+            InputError: a bad command or controller; the walk before the call continues.
         """
-        velocity = self.velocity if velocity is None else number("velocity", velocity)
-        controller = self.controller if controller is None else controller
         with self._restored_if_it_fails():
-            self.velocity, self.controller = velocity, controller
-            if self._plan.hand_over(controller, velocity):
+            before = self.controller
+            self.command = self.command if command is None else _command(command)
+            self.controller = controller or before
+            same = self.controller is before
+            if self._plan.steers and (same or self._plan.hand_over(self.controller)):
+                self._plan.follow(self.command.parts[0])
                 return True
             self.begin()
         return False
@@ -210,7 +186,7 @@ class LiveWalk:
         return self.moment
 
     def _walk(self, steps: int) -> None:
-        chunk = self._rollout.carry_out(next_orders(self._rollout, self._plan.current, self._orders, ONLY, steps))
+        chunk = self._rollout.carry_out(next_orders(self._rollout, self._plan, self._orders, ONLY, steps))
         if chunk.fell.any():
             trunk = chunk.sensors[0, chunk.valid[0] - 1, self.settled.compiled.columns.trunk]
             self.fell_on = self.conditions.body.trunk[int(np.argmax(trunk > 0))]
@@ -244,3 +220,8 @@ class LiveWalk:
                 margin=float(margins[n]),
                 planned_margin=float(planned_margins[step]),
             )
+
+
+def _command(command: Command | float) -> Command:
+    """Return a command, or the command straight ahead at V_r."""
+    return command if isinstance(command, Command) else Command(number("velocity", command))
