@@ -17,6 +17,9 @@ GL_LIBRARIES = libEGL.so.1 libOpenGL.so.0
 GL_PACKAGES = libegl1 libgl1-mesa-dri libopengl0
 GL = $(if $(findstring libEGL.so.1,$(shell PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p)),egl,disable)
 
+LEAGUE = uncoordinated hws ldvs ldvs-tripod own own-0.3 own-0.5 robust-0.1 lasting lasting-0.3 wilson graham graham-random \
+    walknet walknet-reacog walknet-load cpg-tripod cpg-tetrapod cpg-wave flygym-rules righetti tegotae evolved free
+
 .PHONY: compare test slow oldest bench lint docs results gallery system browser
 .DELETE_ON_ERROR:
 
@@ -54,9 +57,7 @@ results: bench
 	.venv/bin/python -m benchmarks.scaling
 	.venv/bin/hexmj biology --processes 2
 	.venv/bin/hexmj reproduce --beside lasting --processes 2
-	.venv/bin/hexmj league --processes 2 --no-video
-	.venv/bin/hexmj league --processes 2 --no-video --protocol steady --velocity 0.5 --trial-starts 1 \
-	    --out results/league/steady
+	.venv/bin/hexmj league --processes 2
 	for varied in "vp 40 80 160" "centre-of-mass -2 0 2" "standing-height 8 10 12" "landing-time 10 20 40" \
 	    "step-height 4 12" "friction 0.5 1"; do \
 	    .venv/bin/hexmj compare --controller ldvs --velocity 0.5 --starts 400 --no-video --$$varied \
@@ -66,6 +67,8 @@ results: bench
 	    --no-video --out results/dynamic
 	.venv/bin/hexmj compare --controller ldvs --velocity 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 --precision 0.03 \
 	    --no-video --out results/over_v
+	.venv/bin/hexmj compare --controller $(LEAGUE) --velocity 0.5 --starts 200 --seed 17 --no-video --processes 2 \
+	    --out results/everyone
 	.venv/bin/python docs/results.py
 
 gallery: .venv/project system

@@ -19,13 +19,13 @@ from PIL import Image
 
 import hexmj
 from hexmj import io
-from hexmj.measures.figures import UNITS
+from hexmj.measures.figures import UNITS, caption
 from hexmj.measures.tables import happened
 from hexmj.paper.claims import claims
-from hexmj.plotting import as_shipped
+from hexmj.plotting import MEASURE_STYLES, as_shipped, head, picture
 from hexmj.stats import paired_difference
 from hexmj.studies.biology import ANIMALS, table_rows, walked_in_words
-from hexmj.studies.standings import by_rank, frequency, place
+from hexmj.tasks.league import frequency, matrix_rows, two_digits
 
 PAGES = Path(__file__).parent
 IMAGES = Path(__file__).parent / "images"
@@ -111,37 +111,26 @@ def _own_sets() -> str:
 
 
 def league(folder: Path) -> list[str]:
-    """Return the tables of the league, the fewest falls first, and draw its figures."""
+    """Return falls in all tasks, and margins and costs in some, and draw the figures of the league."""
     result = io.load(folder / "league.nc")
     with as_shipped():
-        for view, name in {"league": "league", "walks": "league_walks", "prediction": "prediction"}.items():
+        for view, name in {"matrix": "league", "cost": "league_cost"}.items():
             io.save_figure(hexmj.plot(result, view), IMAGES / f"{name}.png")
-    rows = []
-    for name in by_rank(result).entrant.values:
-        own = result.sel(entrant=name)
-        middle = own.sel(velocity=0.5, method="nearest")
-        tried = own.sel(velocity=result.attrs["trial_velocity"], method="nearest")
-        means = [
-            f"{own[measure].mean('velocity').item():.2f}{place(own.sel(measure=measure))}"
-            for measure in ("kinematic", "physical")
-        ]
-        at_half = [frequency(middle, measure) for measure in ("kinematic", "physical")]
-        others = [f"{middle.stable.item():.2f}", frequency(own.sel(trial="step"), "fell"), f"{tried.cost.item():.2f}"]
-        rows.append([name, *(text.replace("nan", "-") for text in (*means, *at_half, *others))])
-    head = "controller|FLSS, mean (rank)|falls, mean (rank)|FLSS, V = 0.5|falls, V = 0.5"
-    first = table(f"{head}|stable gaits, V = 0.5|falls, step|cost of transport", rows)
-    steady = folder / "steady" / "league.nc"
-    return [first, *([_from_steady_state(result, io.load(steady))] if steady.exists() else [])]
-
-
-def _from_steady_state(*protocols: Any) -> str:
-    """Return FLSS and falls at V = 0.5 from random starts and from steady state, the fewest falls from there first."""
-    random, steady = (result.sel(velocity=[0.5], method="nearest") for result in protocols)
-    rows = []
-    for name in by_rank(steady).entrant.values:
-        both = [result.sel(entrant=name) for result in (random, steady)]
-        rows.append([name, *(frequency(own, measure) for measure in ("kinematic", "physical") for own in both)])
-    return table("controller|FLSS, random|FLSS, steady|falls, random|falls, steady", rows)
+    tasks = result.task.values.tolist()
+    first = table("|".join(("controller", *tasks)), matrix_rows(result))
+    columns = {
+        "slow": "margin",
+        "fast": "margin",
+        "curve": "path_distance",
+        "turn": "heading_error",
+        "push": "recovery",
+    }
+    rows = [
+        [name, *(two_digits(result[key].sel(task=task, controller=name).item()) for task, key in columns.items())]
+        for name in result.controller.values.tolist()
+    ]
+    head = "controller|margin, slow|margin, fast|off path, curve [mm]|heading, turn [rad]|recovery, push"
+    return [first, table(head, rows)]
 
 
 def biology(folder: Path) -> list[str]:
@@ -180,6 +169,7 @@ def dynamic(folder: Path) -> list[str]:
     """Return FLDS and falls over V and V_p with their agreement start by start, and draw all measures over V."""
     with as_shipped():
         io.save_figure(hexmj.plot(io.load(folder.parent / "over_v/comparison.nc")), IMAGES / "dynamic.png")
+        _draw_prediction(io.load(folder.parent / "everyone/comparison.nc").isel(velocity=0))
     measures, rows = ("kinematic", "dynamic", "physical"), []
     result = io.load(folder / "comparison.nc").isel(controller=0)
     for v, vp in product(result.velocity.values, result.vp.values):
@@ -188,6 +178,23 @@ def dynamic(folder: Path) -> list[str]:
         agree = [f"{(lost == happened(cell.fall)).mean().item():.2f}" for lost in predicted]
         rows.append([f"{v:g}", f"{vp:g}", *(frequency(cell, name) for name in measures), *agree])
     return [table("V|V_p [mm/s]|kinematic FLSS|FLDS|falls|agreement, FLDS|agreement, FLSS", rows)]
+
+
+def _draw_prediction(result: Any) -> None:
+    """Draw the frequency of falls over FLDS and kinematic FLSS at one velocity, a point for each controller."""
+    figure, away = picture(7.0, 6.0), {}
+    axes = figure.subplots()
+    axes.axline((0.0, 0.0), slope=1.0, color="0.6", linewidth=1.0)
+    for measure, colour, fill in (("kinematic", "#1b6ca8", "none"), ("dynamic", "#2b2b2b", "#2b2b2b")):
+        look: Any = {"color": colour, "mfc": fill, "label": MEASURE_STYLES[measure]["label"], "linestyle": "none"}
+        axes.plot(result[measure], result.physical, marker=MEASURE_STYLES[measure]["marker"], **look)
+        away[measure] = float(abs(result[measure] - result.physical).mean())
+    axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), aspect="equal")
+    axes.set(xlabel="frequency of losses in the plan", ylabel="frequency of falls")
+    axes.legend(loc="upper left", frameon=False, fontsize=9)
+    finding = "mean distance from the frequency of falls: FLDS {dynamic:.3f}, kinematic FLSS {kinematic:.3f}"
+    head(figure, finding.format(**away), caption(result))
+    io.save_figure(figure, IMAGES / "prediction.png")
 
 
 def speed(folder: Path) -> list[str]:

@@ -52,6 +52,15 @@ from .stability import stability_margin as stability_margin
 from .stability import support_polygon as support_polygon
 from .stability import walk_margin as walk_margin
 from .starts import draw_starts as draw_starts
+from .tasks.runner import run_task as run_task
+from .tasks.task import CommandChange as CommandChange
+from .tasks.task import Halt as Halt
+from .tasks.task import LegLost as LegLost
+from .tasks.task import LegStopped as LegStopped
+from .tasks.task import Push as Push
+from .tasks.task import Task as Task
+from .tasks.task import Terrain as Terrain
+from .tasks.task import load_task as load_task
 from .timing import Acceleration as Acceleration
 from .timing import Stride as Stride
 from .version import __version__ as __version__

@@ -13,17 +13,24 @@ from hexmj.errors import InputError
 from hexmj.timing import Stride
 from hexmj.validate import choice, number, whole
 
-GroundKind = Literal["flat", "step", "gap", "hurdle", "rough"]
+GroundKind = Literal["flat", "step", "stairs", "gap", "hurdle", "rough"]
 """Kind of ground, see `Conditions.ground`."""
 
 GROUND_MEASURES: dict[GroundKind, tuple[str, ...]] = {
     "flat": (),
     "step": ("ground_height", "ground_at"),
+    "stairs": ("ground_height", "ground_at", "ground_length"),
     "gap": ("ground_at", "ground_length"),
     "hurdle": ("ground_height", "ground_at", "ground_length"),
     "rough": ("ground_height", "ground_at", "ground_seed"),
 }
 """Kind of ground -> names of the conditions that describe this kind."""
+
+STAIRS = 5
+"""Number of steps of the ground 'stairs'."""
+
+STEEPEST = 0.7
+"""Maximum magnitude of `Conditions.pitch` and `roll` [rad]: 40 degrees."""
 
 ROUNDING = 1e-9
 """Relative tolerance in comparisons and divisions of durations."""
@@ -66,15 +73,23 @@ class Conditions:
     refused, since adhesion presses its feet too deep into the ground."""
 
     ground: GroundKind = "flat"
-    """Kind of ground ahead: flat, a step up, a gap, a hurdle, or rough (a field of bumps on flat ground)."""
+    """Kind of ground ahead: flat, a step up, five stairs, a gap, a hurdle, or rough (a field of bumps)."""
     ground_height: float = 3.0
-    """Height of a step or hurdle, or maximum height of bumps [mm]. A gap is as deep as the shortest leg is long."""
+    """Height of a step, stair or hurdle, or maximum height of bumps [mm]. A gap is as deep as the shortest leg is
+    long."""
     ground_at: float = 50.0
-    """Distance from O at the start to the step, gap, hurdle or rough ground [mm]."""
+    """Distance from O at the start to the step, stairs, gap, hurdle or rough ground [mm]."""
     ground_length: float = 10.0
-    """Length of a gap or hurdle in the direction of walking [mm]."""
+    """Length of a stair, gap or hurdle in the direction of walking [mm]."""
     ground_seed: int = 0
     """Seed of the random heights of the bumps of rough ground."""
+    pitch: float = 0.0
+    """Angle by which the ground rises ahead of the start [rad]; gravity is tilted, the ground stays at z = 0."""
+    roll: float = 0.0
+    """Angle by which the ground rises to the left of the start [rad]."""
+    softness: float = 0.0
+    """Time constant of the contacts with soft ground [ms]; 0 is hard ground, whose time constant is two physics
+    steps."""
 
     longest_substep: float = 0.625
     """Maximum physics step [ms]. Each step of the plan is divided into the fewest equal physics steps that are not
@@ -119,7 +134,13 @@ class Conditions:
     @property
     def highest_ground(self) -> float:
         """Maximum height of the ground above z = 0 [mm]."""
-        return 0.0 if self.ground in ("flat", "gap") else self.ground_height
+        return {"flat": 0.0, "gap": 0.0, "stairs": STAIRS * self.ground_height}.get(self.ground, self.ground_height)
+
+    @property
+    def down(self) -> tuple[float, float, float]:
+        """Direction of gravity in the frame of the ground, a unit vector."""
+        ahead, left = -math.sin(self.pitch), -math.sin(self.roll)
+        return ahead + 0.0, left + 0.0, -math.sqrt(1.0 - ahead**2 - left**2)
 
     def substeps(self, stride: Stride) -> int:
         """Return the number of physics steps in one step of a plan."""
@@ -169,6 +190,9 @@ def ranges(body: Body, ground: GroundKind) -> dict[str, tuple[float, float, bool
         "leg_mass": (0.0, 2.0, True),
         "friction": (0.0, 1000.0, False),
         "grasp": (0.0, 100.0, False),
+        "pitch": (-STEEPEST, STEEPEST, False),
+        "roll": (-STEEPEST, STEEPEST, False),
+        "softness": (0.0, 100.0, False),
         "ground_height": heights,
         "ground_at": (lengths.nearest_obstacle, lengths.farthest_obstacle, False),
         "ground_length": (0.0, lengths.longest_obstacle, True),

@@ -1,6 +1,6 @@
 """Figures of results, and the styles and axes that they share. Figures are made without pyplot."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from io import BytesIO
@@ -16,20 +16,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.image import AxesImage
 
 FIGURES: dict[str, dict[str, str]] = {
     "flss": {"flss": "measures.figures:flss_figure"},
     "compare": {"comparison": "measures.figures:comparison_figure"},
-    "map": {"map": "studies.stability_map:map_figure", "mechanisms": "studies.stability_map:mechanisms_figure"},
-    "terrain": {"terrain": "studies.terrain:terrain_figure"},
-    "disturb": {"disturb": "studies.disturbance:disturbed_figure"},
     "biology": {"biology": "studies.biology:biology_figure"},
-    "league": {
-        "league": "studies.league_figure:league_figure",
-        "walks": "studies.league_figure:walks_figure",
-        "prediction": "studies.league_figure:prediction_figure",
-    },
+    "tasks": {"matrix": "tasks.league:matrix_figure", "cost": "tasks.league:cost_figure"},
     "search": {"convergence": "search.results:convergence_figure"},
     "recording": {"walk": "replay.take:walk_figure"},
 }
@@ -162,24 +154,26 @@ def interval(data: "xr.Dataset", name: str) -> tuple[np.ndarray, np.ndarray]:
     return middle, np.stack([middle - low, high - middle])
 
 
-def heat_map(axes: "Axes", velocities: np.ndarray, values: np.ndarray, texts: np.ndarray, **style: Any) -> "AxesImage":
-    """Draw a heat map without a frame, with a text in every cell and a column for each velocity.
+def heat_map(axes: "Axes", columns: Sequence[str], values: np.ndarray, texts: np.ndarray, **scale: Any) -> None:
+    """Draw a heat map without a frame, with a text in every cell.
 
     Args:
         axes: axes to draw in.
-        velocities: labels of the columns, (column,).
+        columns: labels of the columns, drawn above them.
         values: numbers shown as colours, (row, column); NaN has no colour.
-        texts: texts of the cells, (row, column); an empty text is not drawn.
-        style: options of `Axes.imshow`.
+        texts: texts of the cells, (row, column), a first line in bold if there are two; an empty text is not drawn.
+        scale: options of `Axes.imshow`.
     """
-    image = axes.imshow(values, aspect="auto", **style)
+    image = axes.imshow(values, aspect="auto", **scale)
     shade = image.to_rgba(values)[..., :3] @ [0.3, 0.59, 0.11]
     for row, column in np.argwhere(texts != ""):
         colour = "white" if shade[row, column] < 0.5 and np.isfinite(values[row, column]) else "0.1"
-        axes.text(column, row, str(texts[row, column]), color=colour, ha="center", va="center", fontsize=9)
+        text, _, small = str(texts[row, column]).partition("\n")
+        style: Any = {"color": colour, "ha": "center", "va": "center", "fontsize": 9}
+        axes.text(column, row - 0.22 * bool(small), text, fontweight="bold" if small else "normal", **style)
+        if small:
+            axes.text(column, row + 0.22, small, **style)
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
-    every = 1 + len(velocities) // 7
-    axes.set_xticks(range(0, len(velocities), every), [f"{v:g}" for v in velocities[::every]], fontsize=9)
-    axes.set_xlabel(VELOCITY, fontsize=9)
-    return image
+    axes.xaxis.tick_top()
+    axes.set_xticks(range(len(columns)), columns, fontsize=9, rotation=40, ha="left")

@@ -56,6 +56,7 @@ COARSE = hexmj.Stride(dt=0.5)
 
 # Files of a user, among them the examples.
 USER_FILES = {file.name: file.read_text() for file in EXAMPLES.glob("*.*")} | {
+    "mine.toml": "duration = 40\ncommand = 0.2\n[terrain]\nground = 'stairs'\n[[events]]\nkind = 'halt'\ntime = 10\n",
     "weights.toml": "order = 'sequential'\n[symmetric]\np1_i = 12\np1_c = 6\np31_i = -9\np32_i = 6\np4_i = 1\n",
     "fields.toml": "controller = 'tripod.py:Tripod'\n[fields]\npull = 0.5\n",
     "broken.py": "from tripod import Tripod\nclass Broken(Tripod):\n    begin = lambda *_: None\n",
@@ -293,7 +294,6 @@ FLSS = "flss --starts 100 --observation-time start --velocity"
 FALLS = "flss --measure physical --velocity 0.8 --starts 6 --observation-time 40"
 SEARCH = "search --observation-time start --starts 20 --budget 20 --refine-budget 0 --verdict-starts 30 --form"
 FILM = "--width 160 --height 120 --fps 10"
-LEAGUE = "league --quick --starts 10 --physical-starts 2 --trial-starts 1 --velocity 0.5 --trial-velocity 0.8"
 FOOT_PATH = "--vp 120 --step-height 9 --standing-height 11 --lift-time 10 --landing-time 15 --contact-gap 5"
 MASSES = "--load 1 --centre-of-mass 2 --leg-mass 0.5 --friction 0.5 --grasp 0.5 --longest-substep 0.3"
 MODELS = ("walknet", "tegotae", "evolved", "turning.py:Turning", "contact_controller.py:Feeler")
@@ -351,14 +351,10 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "view live": lambda: view("--velocity 0.5"),
     "view recording": lambda: view("walk.nc"),
     "view session": view_session,
-    "league": f"{LEAGUE} --controller ldvs graham wilson tripod.py:Tripod --dt 0.5 --vp 200 --no-video",
-    "map V_p": lambda: resumed("map --over vp --values 40 160 --velocity 0.8 --starts 4 --observation-time 20"),
-    "map centre of mass": (
-        "map --over centre_of_mass --values -5 0 --velocity 0.8 --starts 3 --observation-time 20 --vp 200"
-    ),
-    "disturb": "disturb --velocity 0.5 --starts 2 --observation-time 40 --impulses 5 --dt 0.5 --vp 200",
-    "disturb kinematic": "disturb --kinematic --velocity 0.7 --starts 8 --observation-time 40",
-    "terrain": "terrain --velocity 0.8 --starts 2 --grounds step gap rough --lengths 10 --grasps 0 1 --dt 0.5",
+    "task": lambda: resumed("task turn push --starts 2 --dt 0.5 --controller graham tripod.py:Tripod"),
+    "task file": "task mine.toml --starts 2 --dt 0.5",
+    "league": "league --quick --starts 2 --dt 0.5 --tasks slow step --controller ldvs free tripod.py:Tripod",
+    "league list": lambda: text("league --list"),
     "biology": "biology --starts 1 --periods 4",
     "reproduce claims": "reproduce --quick --only hws-close ideal-0.4 p4 --beside lasting",
     "reproduce figures": reproduce,

@@ -11,6 +11,7 @@ import json
 import platform
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -73,41 +74,40 @@ def other_conditions(seed: int) -> Arrays:
 
 
 def disturbed(seed: int) -> Arrays:
-    from hexmj.studies.disturbance import DisturbedWalks
-    from hexmj.sweep import run_study
-
-    few: Any = {"velocities": [0.6], "n_starts": 4, "observation_time": 30.0, "seed": seed}
-    return _table(run_study(DisturbedWalks(hexmj.LDVS, impulses=[40.0], **few)))
+    events: dict[str, Any] = {"halt": hexmj.Halt, "leg": hexmj.LegStopped, "push": partial(hexmj.Push, impulse=40.0)}
+    tasks = [hexmj.Task("undisturbed", 0.6, events=(hexmj.Push(impulse=0.0),), duration=30.0)]
+    for kind, event in events.items():
+        for answer in ("none", "reorganise", "slow_down"):
+            tasks.append(hexmj.Task(f"{kind} {answer}", 0.6, events=(event(answer=answer),), duration=30.0))
+        adhesive = hexmj.Conditions(grasp=1.0)
+        tasks.append(hexmj.Task(f"{kind} grasp", 0.6, events=(event(),), duration=30.0, conditions=adhesive))
+    return _events(hexmj.run_task(tasks, hexmj.LDVS, n_starts=4, seed=seed))
 
 
 def disturbed_with_feedback(seed: int) -> Arrays:
-    from hexmj.studies.disturbance import DisturbedWalks
-    from hexmj.sweep import run_study
+    events = hexmj.Push(impulse=0.0), hexmj.Halt(), hexmj.Halt(answer="reorganise")
+    tasks = [hexmj.Task(str(i), 0.6, events=(event,), duration=30.0) for i, event in enumerate(events)]
+    return _events(hexmj.run_task(tasks, hexmj.SensoryFeedback(hexmj.LDVS), n_starts=3, seed=seed))
 
-    few: Any = {"velocities": [0.6], "n_starts": 3, "observation_time": 30.0, "seed": seed}
-    halted = DisturbedWalks(hexmj.SensoryFeedback(hexmj.LDVS), disturbances=["halt"], strategies=["reorganise"], **few)
-    return _table(run_study(halted))
+
+def _events(result: Any) -> Arrays:
+    """Times over (velocity, case, start), named as in version 0.5."""
+    names = {"event": "time", "back": "back", "planned_loss": "planned_loss", "fall": "fall"}
+    return {name: result[key].values.swapaxes(0, 1) for key, name in names.items()}
 
 
 def terrain(seed: int) -> Arrays:
-    from hexmj.studies.terrain import Terrain
-    from hexmj.sweep import run_study
-
-    few: Any = {"velocities": [0.6], "heights": [3.0], "lengths": [5.0], "n_starts": 4, "seed": seed}
-    return _table(run_study(Terrain(hexmj.LDVS, **few)))
-
-
-def mapped(seed: int) -> Arrays:
-    from hexmj.studies.stability_map import StabilityMap
-    from hexmj.sweep import run_study
-
-    chosen: Any = {"vp": [40.0, 160.0], "centre_of_mass": [-5.0, 0.0]}
-    few: Any = {"velocities": [0.5], "n_starts": 6, "observation_time": 60.0, "seed": seed}
-    out = {}
-    for over, values in chosen.items():
-        data = run_study(StabilityMap(hexmj.LDVS, over, values, **few))
-        out |= {f"{over} {name}": numbers for name, numbers in _table(data).items()}
-    return out
+    step, gap, rough = (getattr(hexmj.Terrain, name) for name in ("step", "gap", "rough"))
+    hurdle = hexmj.Terrain("hurdle", 3.0, 80.0, 10.0)
+    grounds = [hexmj.Terrain(), step(3.0, 80.0), gap(5.0, 80.0), hurdle, rough(3.0, at=80.0)]
+    tasks = [
+        hexmj.Task(f"{i} {grasp}", 0.6, ground, duration=150.0 / 0.6, conditions=hexmj.Conditions(grasp=grasp))
+        for i, ground in enumerate(grounds)
+        for grasp in (0.0, 1.0)
+    ]
+    result = hexmj.run_task(tasks, hexmj.LDVS, n_starts=4, seed=seed)
+    names = ("fall", "fall_part", "tilt", "speed")
+    return {name: result[name].values.reshape(5, 2, 1, 4) for name in names}
 
 
 def searched(seed: int) -> Arrays:
@@ -176,7 +176,7 @@ def reproduced(seed: int) -> Arrays:
 
 SAMPLES: tuple[Callable[[int], Arrays], ...] = (
     kinematic_flss, gaits, compared, compared_with_feedback, other_conditions, disturbed, disturbed_with_feedback,
-    terrain, mapped, searched, recorded, environment, reproduced,
+    terrain, searched, recorded, environment, reproduced,
 )  # fmt: skip
 
 

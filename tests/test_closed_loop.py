@@ -106,7 +106,7 @@ def test_a_push_is_that_of_the_open_loop():
     for impulse in (0.0, 30.0):
         push = Push(np.array([impulse, -impulse]), np.array([2.0, 2.0]))
         planned = standing.begin(*still).advance(80)
-        path = physical_walk_of_plan(settled, standing.begin(*still), planned, push=push).centre_of_mass[:, :, 1]
+        path = physical_walk_of_plan(settled, standing.begin(*still), planned, pushes=[push]).centre_of_mass[:, :, 1]
         speed.append((path[-1] - path[-21]) / 20 / conditions.seconds(STRIDE))  # mm/s
     assert_allclose((speed[1] - speed[0]) * conditions.body.mass, [30.0, -30.0], rtol=0.02)
 

@@ -13,7 +13,7 @@ from hexmj.controllers.steered import Lines, begin
 from hexmj.errors import InputError
 from hexmj.legs import MIRROR, SIDE, WORKSPACE, Workspace
 from hexmj.measures.physical import physical_walk
-from hexmj.studies.league_cells import EVERYONE, entrants
+from hexmj.tasks.league import EVERYONE, entrants
 
 STRIDE = hexmj.Stride()
 STARTS = hexmj.draw_starts(5, 67)

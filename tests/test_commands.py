@@ -10,6 +10,7 @@ import time
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,9 +75,9 @@ def test_every_field_of_a_study_and_its_conditions_is_an_option_or_hidden(name):
 @pytest.mark.parametrize("name", STUDIES)
 def test_without_options_a_study_has_its_own_defaults(name):
     chosen = command(name)
-    study = chosen.build(chosen.parse(name, []))  # pyright: ignore[reportAttributeAccessIssue]
+    study = chosen.build(chosen.parse(name, ["slow"] * (name == "task")))  # pyright: ignore[reportAttributeAccessIssue]
     for field in fields(study):
-        if field.name not in ("controller", "controllers", "axes"):
+        if field.name not in ("controller", "controllers", "axes", "tasks"):
             value = getattr(study, field.name)
             assert value == (tuple(field.default) if isinstance(value, tuple) else field.default)  # pyright: ignore
 
@@ -157,13 +158,12 @@ BAD = [
     "page taken",
     "view nowhere.nc",
     "view nowhere.nc --vp 40",
-    "map --over mood",
-    "map --over vp --vp 40",
-    "disturb --disturbances dance",
-    "terrain --velocity 0 --grounds step",
+    "task",
+    "task dance",
+    "task nowhere.toml",
     "biology --periods 1",
     "league --controller",
-    "league --velocity",
+    "league --tasks dance",
     "search --velocity 0.1 0.2 0.3",
     "search --form lvds",
     "search --load 1",
@@ -279,10 +279,10 @@ def test_answers_name_controllers_that_were_searched_on_the_same_starts(run, tmp
 
 def test_a_quick_league_takes_its_sizes_unless_others_are_given():
     chosen = command("league")
-    words = ["--quick", "--controller", "ldvs", "wilson", "--velocity", "0.5", "--starts", "10"]
-    study = chosen.build(chosen.parse("league", words))  # pyright: ignore[reportAttributeAccessIssue]
-    assert (study.velocities, study.n_starts, study.physical_starts, study.trial_starts) == ((0.5,), 10, 8, 4)
-    assert [*study.controllers] == ["ldvs", "wilson"]
+    words = ["--quick", "--controller", "ldvs", "wilson", "--starts", "10"]
+    built: Any = [chosen.build(chosen.parse("league", some)) for some in (words, ["--quick"])]  # pyright: ignore
+    assert [study.n_starts for study in built] == [10, 8]
+    assert [len(study.controllers) for study in built] == [2, 4] and len(built[0].tasks) == 14
 
 
 # ---- ends ----

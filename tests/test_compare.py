@@ -13,24 +13,24 @@ from hexmj import (
     LDVS,
     UNCOORDINATED,
     Acceleration,
+    Command,
     Conditions,
+    Halt,
     InputError,
     SensoryFeedback,
+    Task,
     compare,
     physical_flss,
 )
 from hexmj.measures import study
 from hexmj.measures.compare import Comparison
 from hexmj.physics import settle as settling
-from hexmj.studies.disturbance import DisturbedWalks
-from hexmj.studies.stability_map import StabilityMap
-from hexmj.studies.terrain import Terrain
 from hexmj.sweep import Cell, run_study
+from hexmj.tasks.runner import TaskStudy
 from tiers import few_of
 
 BOTH = {"ldvs": LDVS, "uncoordinated": UNCOORDINATED}
 FEW: dict[str, Any] = {"n_starts": 3, "observation_time": 10.0}
-PUSHED: dict[str, Any] = FEW | {"observation_time": 60.0}
 
 
 @pytest.fixture(scope="module")
@@ -94,17 +94,16 @@ def test_each_point_of_the_axes_equals_a_run_of_its_own(run, tmp_path):
     assert answer["ldvs"]["physical"] == every.physical.sel(controller="ldvs").values.tolist()
 
 
+TURN = Task("turn", Command(0.0, turn=0.01), duration=30.0)
 STUDIES = {
     "compare": Comparison(BOTH, [0.6], **FEW),
     "feedback": Comparison({"feedback": SensoryFeedback(LDVS)}, [0.5, 0.6], **FEW),
-    "map": StabilityMap(LDVS, "load", [0.0, 0.5], [0.6], **FEW),
-    "terrain": Terrain(LDVS, [0.8], grounds=["step"], heights=[3.0], grasps=[0.0], n_starts=2),
-    "disturb": DisturbedWalks(LDVS, [0.7], ["halt", "push"], strategies=["reorganise"], **PUSHED),
+    "tasks": TaskStudy([TURN, Task("halt", 0.6, events=(Halt(),), duration=5.0)], BOTH, 2),
 }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", few_of(STUDIES, "compare", "feedback", "map", "terrain"))
+@pytest.mark.parametrize("name", few_of(STUDIES, "compare", "feedback"))
 def test_processes_and_threads_give_the_same_bits(name, two_processes):
     here = run_study(STUDIES[name], threads=2)
     assert run_study(STUDIES[name], executor=two_processes).identical(here)

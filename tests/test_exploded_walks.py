@@ -58,7 +58,7 @@ def test_a_walk_that_explodes_before_its_push_is_an_error():
     settled, push = thrown(up=1500.0), Push(np.array([0.0, 60.0 * 80.0, 0.0]), np.full(3, 15.0))
     plan = begin(LDVS, settled.starts, 0.3, settled.stride)
     with pytest.raises(SimulationError):
-        list(drive(settled, plan, 20.0, push=push))
+        list(drive(settled, plan, 20.0, pushes=[push]))
 
 
 def test_energy_is_bounded_well_above_a_walk_and_below_an_explosion():
@@ -104,8 +104,8 @@ def test_an_insect_that_a_push_still_throws_as_the_window_ends_is_no_outcome():
     plan = [begin(LDVS, settled.starts, 0.5, settled.stride) for _ in range(2)]
     hard, none = (Push(np.array([0.0, push]), np.full(2, 10.0)) for push in (3200.0, 0.0))
     with pytest.raises(StillThrown):
-        outcomes_of_plan(settled, plan[0], 14.0, np.full(2, np.inf), push=hard)
-    assert np.isinf(outcomes_of_plan(settled, plan[1], 14.0, np.full(2, np.inf), push=none).fall).all()
+        outcomes_of_plan(settled, plan[0], 14.0, np.full(2, np.inf), pushes=[hard])
+    assert np.isinf(outcomes_of_plan(settled, plan[1], 14.0, np.full(2, np.inf), pushes=[none]).fall).all()
 
 
 def outcomes(conditions: Conditions, velocity: float, push: float = 0.0, duration: float = 80.0) -> Outcomes:
@@ -113,7 +113,7 @@ def outcomes(conditions: Conditions, velocity: float, push: float = 0.0, duratio
     settled = settle(draw_starts(24, 5), conditions)
     pushed = Push(np.full(24, push * conditions.vp), np.full(24, 20.0))
     plan = begin(LDVS, settled.starts, velocity, settled.stride)
-    return outcomes_of_plan(settled, plan, duration, np.full(24, np.inf), push=pushed)
+    return outcomes_of_plan(settled, plan, duration, np.full(24, np.inf), pushes=[pushed])
 
 
 @pytest.mark.slow

@@ -19,23 +19,10 @@ from hexmj.errors import InputError
 from hexmj.plotting import FIGURES
 from hexmj.search.stages import history
 from hexmj.studies.biology import Biology
-from hexmj.studies.disturbance import DisturbedWalks
-from hexmj.studies.league import League
-from hexmj.studies.league_cells import entrants
-from hexmj.studies.stability_map import StabilityMap
-from hexmj.studies.terrain import Terrain
 from hexmj.sweep import run_study
 from tiers import few_of
 
 PHYSICAL: dict[str, Any] = {"n_starts": 3, "observation_time": 20.0}
-KINEMATIC: dict[str, Any] = {"n_starts": 20, "observation_time": 20.0, "kinematic": True, "strategies": ["reorganise"]}
-SHORT: dict[str, Any] = {
-    "n_starts": 3,
-    "physical_starts": 2,
-    "periods": 12,
-    "trial_starts": 1,
-    "observation_time": 10.0,
-}
 NAME = "ß: 1 $"
 """A name that JSON escapes, and that figures could set as a formula."""
 
@@ -58,11 +45,8 @@ def recorded() -> xr.Dataset:
 MADE: dict[str, Callable[[], xr.Dataset]] = {
     "flss": lambda: hexmj.physical_flss(hexmj.LDVS, [0.5, 0.7], **PHYSICAL),
     "compare": compared,
-    "map": lambda: run_study(StabilityMap(hexmj.UNCOORDINATED, "vp", [160.0, 320.0], [0.5, 0.7], **PHYSICAL)),
-    "terrain": lambda: run_study(Terrain(hexmj.LDVS, [0.6], ["step", "hurdle"], [3.0], grasps=[0.0], n_starts=2)),
-    "disturb": lambda: run_study(DisturbedWalks(hexmj.LDVS, [0.5, 0.6], ["halt", "leg"], **KINEMATIC)),
     "biology": lambda: run_study(Biology(hexmj.LDVS, 4, n_starts=2)),
-    "league": lambda: run_study(League(entrants(("ldvs", "hws")), (0.5, 0.7), **SHORT)),
+    "tasks": lambda: hexmj.run_task(["slow", "fast"], {"ldvs": hexmj.LDVS, "hws": hexmj.HWS}, n_starts=2),
     "search": searched,
     "recording": recorded,
 }
@@ -80,7 +64,7 @@ def pixels(result: xr.Dataset, which: str | None = None) -> bytes:
     return drawn.getvalue()
 
 
-@pytest.mark.parametrize("name", few_of(MADE, *QUICK, "map", "terrain"))
+@pytest.mark.parametrize("name", few_of(MADE, *QUICK))
 def test_a_result_and_its_figures_stay_the_same_when_saved_and_loaded(name: str, tmp_path: Path) -> None:
     result = made(name)
     read = hexmj.load(hexmj.save(result, tmp_path / "result.nc"))
@@ -102,7 +86,7 @@ def test_the_order_of_the_axes_changes_no_pixel(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "axis"),
     few_of(
-        [("flss", "velocity"), ("compare", "velocity"), ("disturb", "velocity")],
+        [("flss", "velocity"), ("compare", "velocity")],
         ("flss", "velocity"),
     ),
 )
@@ -118,27 +102,18 @@ def head_of(result: xr.Dataset) -> str:
     return " ".join(" ".join(texts).replace("\N{NO-BREAK SPACE}", " ").split())
 
 
-def cells(result: xr.Dataset) -> list[tuple[str, ...]]:
-    """Title, row and column of each cell of a map's panels, its text and the number behind its colour."""
-    found, figure = [], hexmj.plot(result)
-    for axes in figure.axes:
-        (image,) = axes.images
-        labels = axes.get_xticklabels(), figure.axes[0].get_yticklabels()
-        columns, rows = ([text.get_text() for text in texts] for texts in labels)
-        for text in axes.texts:
-            x, y = map(int, text.get_position())
-            number = str(np.asarray(image.get_array())[y, x])
-            found.append((axes.get_title(), rows[y], columns[x], text.get_text(), number))
-    return sorted(found)
-
-
-def test_every_number_of_a_map_stands_in_its_cell() -> None:
-    result, backwards = made("map"), {"value": slice(None, None, -1), "velocity": slice(None, None, -1)}
-    whole = cells(result)
-    assert {words for *_, words in whole} - {"0.0", "nan"}
-    for other in (result.transpose("velocity", "value", ...), result.isel(backwards)):
-        assert cells(other) == whole
-    assert set(cells(result.isel(velocity=[1]))) < set(whole)
+@pytest.mark.slow
+def test_every_number_of_the_league_stands_in_its_cell() -> None:
+    result = made("tasks")
+    for shown in (result, result.isel(task=[1], controller=[1, 0])):
+        axes = hexmj.plot(shown).axes[0]
+        labels = [[label.get_text() for label in get()] for get in (axes.get_yticklabels, axes.get_xticklabels)]
+        numbers = [text for text in axes.texts if text.get_fontweight() == "bold"]
+        assert len(numbers) == shown.fell.size
+        for text in numbers:
+            column, row = (round(value) for value in text.get_position())
+            fell = shown.fell.sel(controller=labels[0][row], task=labels[1][column]).item()
+            assert float(text.get_text()) == round(fell, 2)
 
 
 def test_candidates_stand_at_their_evaluation() -> None:

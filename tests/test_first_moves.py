@@ -17,7 +17,6 @@ from hexmj.controllers.planning import (
 from hexmj.controllers.wrappers import WARM_UP, FromSteadyState
 from hexmj.measures.compare import Comparison
 from hexmj.stability import loss_time
-from hexmj.studies.league import League
 from hexmj.timing import Stride
 from hexmj.tipping import Pendulum
 from hexmj.walks import PLANNED, part_of
@@ -70,9 +69,3 @@ def test_steady_results_depend_on_neither_threads_nor_batch():
 def test_a_protocol_is_refused_without_a_period_or_with_an_acceleration(given):
     with pytest.raises(hexmj.InputError, match="protocol"):
         Comparison({"ldvs": hexmj.LDVS}, **(STEADY | given))
-
-
-def test_only_kinematic_and_physical_walks_of_a_league_begin_in_the_steady_state():
-    random, steady = (League({"ldvs": hexmj.LDVS}, (0.5,), protocol=p).named_cells() for p in ("random", "steady"))
-    changed = {key[1] for key, cell in steady.items() if cell.record() != random[key].record()}
-    assert changed == {"kinematic 0.5", "physics 0.5"}

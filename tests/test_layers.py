@@ -16,7 +16,7 @@ LAYERS = (
     ("physics",),
     ("measures", "gaits"),
     ("studies", "rendering"),
-    ("search", "environments", "replay"),
+    ("search", "tasks", "environments", "replay"),
     ("paper", "league", "view"),
     ("cli",),
     ("__main__", ""),

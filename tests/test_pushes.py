@@ -38,7 +38,7 @@ def test_a_push_gives_the_momentum_asked_for(vp):
         plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
         centre = settled.compiled.columns.centre_of_mass
         y = np.concatenate(
-            [one.sensors[:, :, centre][:, :, 1] for one in drive(settled, plan, 0.1 * vp, push=push)], axis=1
+            [one.sensors[:, :, centre][:, :, 1] for one in drive(settled, plan, 0.1 * vp, pushes=[push])], axis=1
         )
         speed.append((y[:, -1] - y[:, -40]) / 39 / settled.compiled.model.opt.timestep)  # mm/s
     assert_allclose((speed[1] - speed[0])[:2] * STICK_INSECT.mass, [30.0, -30.0], rtol=0.02)
@@ -52,7 +52,7 @@ def test_a_push_lasts_as_long_whatever_the_physics_step():
         settled = settle(draw_starts(3, 0), Conditions(longest_substep=longest))
         push = Push(np.full(3, 800.0), np.full(3, 2.0))
         plan = begin(UNCOORDINATED, settled.starts, 0.0, settled.stride)
-        *_, last = drive(settled, plan, 8.0, push=push)
+        *_, last = drive(settled, plan, 8.0, pushes=[push])
         slid.append(last.qpos[:, -1, 1])
     assert_allclose(slid[1], slid[0], rtol=0.05)
 
@@ -65,9 +65,9 @@ def test_a_push_begins_when_told(vp):
     begun = np.array([2 * lasts, 2 * lasts, 2 * lasts + 4])
     push = Push(np.full(3, 10.0 * vp), begun * settled.stride.dt)
     ends = []
-    for pushed in (push, None):
+    for pushed in ([push], []):
         plan = begin(LDVS, settled.starts, 0.3, settled.stride)
-        shown = [one.qpos for one in drive(settled, plan, 4.0 * lasts * settled.stride.dt, push=pushed)]
+        shown = [one.qpos for one in drive(settled, plan, 4.0 * lasts * settled.stride.dt, pushes=pushed)]
         ends.append(np.concatenate(shown, axis=1))
     for start, begins in enumerate(begun * settled.substeps):
         assert np.array_equal(ends[0][start, : begins + 1], ends[1][start, : begins + 1])
@@ -85,7 +85,7 @@ def test_a_push_depends_on_no_start_beside(vp):
         settled = settle(starts[ids], conditions)
         plan = begin(LDVS, settled.starts, 0.4, settled.stride)
         push = Push(np.full(len(ids), impulse), times[ids])
-        return outcomes_of_plan(settled, plan, 80.0, np.full(len(ids), np.inf), push=push)
+        return outcomes_of_plan(settled, plan, 80.0, np.full(len(ids), np.inf), pushes=[push])
 
     together = outcomes([0, 1, 2])
     for n in range(3):
@@ -106,9 +106,9 @@ def test_pushes_that_make_no_sense_are_refused(case):
     """A walk of 5.05 time units ends with the step at 5; a push lasts 2."""
     settled = settle(draw_starts(2, 0))
     with pytest.raises(InputError):
-        list(drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.05, push=Push(*BAD[case])))
+        list(drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.05, pushes=[Push(*BAD[case])]))
     last = Push(np.ones(2), np.full(2, 3.0))
-    assert list(drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.05, push=last))
+    assert list(drive(settled, begin(LDVS, settled.starts, 0.5, settled.stride), 5.05, pushes=[last]))
 
 
 @pytest.mark.parametrize(("vp", "fits"), [(8.0, False), (20.0, False), (21.0, True)])
@@ -120,4 +120,4 @@ def test_steps_of_the_plan_must_be_short_enough_for_a_push(vp, fits):
     for impulse in (0.0, 1.0):
         push = Push(np.full(1, impulse), np.ones(1))
         with nullcontext() if fits or not impulse else pytest.raises(InputError):
-            list(drive(settled, begin(LDVS, settled.starts, 0.5, stride), 4.0, push=push))
+            list(drive(settled, begin(LDVS, settled.starts, 0.5, stride), 4.0, pushes=[push]))

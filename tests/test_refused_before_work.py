@@ -12,10 +12,7 @@ from hexmj.environments.learned import WithOffsets
 from hexmj.measures.compare import Comparison
 from hexmj.measures.kinematic import KinematicFlss
 from hexmj.studies.biology import Biology
-from hexmj.studies.disturbance import DisturbedWalks
-from hexmj.studies.league import League
-from hexmj.studies.stability_map import StabilityMap
-from hexmj.studies.terrain import Terrain
+from hexmj.tasks.runner import TaskStudy
 
 
 @pytest.mark.parametrize(
@@ -24,9 +21,7 @@ from hexmj.studies.terrain import Terrain
         "flss --controller righetti --velocity 0.02 0.9 --dt 0.5",
         "compare --controller ldvs righetti --velocity 0.5 --dt 1",
         "flss --velocity 0.3 0.95 --acceleration 0.6",
-        "terrain --grasps 0 50",
-        "map --over load --values 0 10 --grasp 9 --velocity 0.3",
-        "league --grasp 10",
+        "task fast --controller righetti --dt 1",
     ],
 )
 def test_what_ends_the_work_is_refused_before_it(run, tmp_path, words: str) -> None:
@@ -76,7 +71,6 @@ class Still:
 
 
 LIMITED = Limited()
-FEW: Any = {"n_starts": 2, "physical_starts": 1, "trial_starts": 1}
 FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
 
 
@@ -85,16 +79,17 @@ FAST: Any = {"velocities": (0.1, 0.3), "n_starts": 2}
     [
         KinematicFlss(LIMITED, **FAST),
         Comparison({"first": hexmj.LDVS, "limited": LIMITED}, **FAST),
-        StabilityMap(LIMITED, values=(40.0,), **FAST),
-        Terrain(LIMITED, **FAST),
-        DisturbedWalks(LIMITED, disturbances=("push",), impulses=(1.0,), strategies=(), **FAST),
         Biology(LIMITED, n_starts=2),
-        Terrain(hexmj.SensoryFeedback(LIMITED), **FAST),
-        Terrain(LegLost(LIMITED, 0), **FAST),
-        Terrain(PoorSenses(hexmj.SensoryFeedback(LIMITED)), **FAST),
-        Terrain(WithOffsets(Still(), controller=LIMITED), **FAST),
-        League({"limited": LIMITED}, (0.1, 0.3), **FEW),
-        League({"limited": LIMITED}, (0.1,), trial_velocity=0.3, **FEW),
+        *(
+            TaskStudy([hexmj.Task("t", 0.3)], {"limited": wrapped}, 2)
+            for wrapped in (
+                LIMITED,
+                hexmj.SensoryFeedback(LIMITED),
+                LegLost(LIMITED, 0),
+                PoorSenses(hexmj.SensoryFeedback(LIMITED)),
+                WithOffsets(Still(), controller=LIMITED),
+            )
+        ),
     ],
     ids=lambda study: type(study).__name__,
 )
@@ -113,29 +108,17 @@ def test_walks_that_accelerate_are_not_refused_before_the_work() -> None:
 @pytest.mark.parametrize(
     ("name", "study", "wrong"),
     [
-        ("controllers", League, {"controllers": {}}),
-        ("load", League, {"conditions": hexmj.Conditions(load=2.0)}),
-        ("velocit", League, {"velocities": (0.0, 0.5)}),
-        ("periods", League, {"periods": 3}),
         ("periods", Biology, {"periods": 3}),
         ("vp", Biology, {"conditions": hexmj.Conditions(vp=38.0)}),
         ("ground", Biology, {"conditions": hexmj.Conditions(ground="rough")}),
-        ("ground_height", Terrain, {"heights": (32.0,)}),
-        ("heights", Terrain, {"heights": (2.0, 2.0)}),
-        ("velocity", Terrain, {"velocities": (0.0,)}),
-        ("over", StabilityMap, {"over": "wind"}),
-        ("friction", StabilityMap, {"over": "friction", "values": [-1.0]}),
-        ("sensory feedback", StabilityMap, {"controller": hexmj.SensoryFeedback(hexmj.LDVS)}),
-        ("disturbances", DisturbedWalks, {"disturbances": ["halt", "halt"]}),
-        ("disturbances", DisturbedWalks, {"disturbances": ["push"], "kinematic": True}),
-        ("strategies", DisturbedWalks, {"strategies": ["jump"]}),
-        ("impulses", DisturbedWalks, {"impulses": [-1.0]}),
-        ("velocities", DisturbedWalks, {"velocities": [0.05]}),
-        ("observation_time", DisturbedWalks, {"observation_time": 1.9}),
-        ("counts", DisturbedWalks, {"controller": Counts()}),
+        ("axes", Comparison, {"axes": {"wind": (1.0,)}}),
+        ("friction", Comparison, {"axes": {"friction": (-1.0,)}}),
+        ("controllers", TaskStudy, {"controllers": {}}),
+        ("tasks", TaskStudy, {"tasks": [hexmj.Task("t"), hexmj.Task("t")]}),
     ],
 )
 def test_bad_input_is_refused(name: str, study: Any, wrong: dict[str, Any]) -> None:
-    one: Any = {"controllers": {"ldvs": hexmj.LDVS}} if study is League else {"controller": hexmj.LDVS}
+    one: Any = {"controller": hexmj.LDVS} if study is Biology else {"controllers": {"ldvs": hexmj.LDVS}}
+    one |= {"tasks": [hexmj.Task("t")]} if study is TaskStudy else {}
     with pytest.raises(hexmj.InputError, match=name):
         study(**one | wrong)

@@ -53,7 +53,9 @@ def outcomes(
     size = len(settled.starts)
     pushed = Push(np.full(size, push * STICK_INSECT.mass * settled.conditions.vp), np.full(size, 20.0))
     plan = begin(controller, settled.starts, 0.6, settled.stride)
-    return outcomes_of_plan(settled, plan, 130.0 if push else 80.0, np.full(size, np.inf), push=pushed, threads=threads)
+    return outcomes_of_plan(
+        settled, plan, 130.0 if push else 80.0, np.full(size, np.inf), pushes=[pushed], threads=threads
+    )
 
 
 def allowed(settled: Settled) -> float:

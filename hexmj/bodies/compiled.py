@@ -1,5 +1,6 @@
 """A compiled body: its MuJoCo model, the columns of its joints and sensors, its kinematics and its dimensions."""
 
+import math
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -92,7 +93,7 @@ class CompiledBody:
     @property
     def weight(self) -> float:
         """Weight of the body itself, without its load [g mm/s^2]."""
-        return -self.body.mass * float(self.model.opt.gravity[2])
+        return self.body.mass * math.hypot(*self.model.opt.gravity)
 
     @property
     def torque_limits(self) -> np.ndarray:

@@ -6,13 +6,10 @@
 import mujoco
 import numpy as np
 
-from hexmj.conditions import Conditions
+from hexmj.conditions import STAIRS, Conditions
 
 BUMPS = (15, 9)
 """Numbers of bumps along and across the direction of walking: at 12 mm spacing they cover 180 by 108 mm."""
-
-WITH_ENDS = "step", "hurdle", "gap"
-"""Kinds of ground with edges that an insect must not cross; on flat and rough ground the plane goes on."""
 
 LOOK = {"contype": 0, "conaffinity": 0, "rgba": (0.78, 0.84, 0.90, 1.0)}
 """Settings of an obstacle's geom: contacts only in pairs, and a tint that distinguishes it from the plane."""
@@ -24,20 +21,12 @@ CONTACT = ("condim", "friction", "solref", "solimp")
 def lay_ground(spec: mujoco.MjSpec, conditions: Conditions) -> None:
     """Add obstacles, and their contact pairs with feet and trunk, to the spec of a body on its plane."""
     body, lengths, kinds = conditions.body, conditions.body.lengths, mujoco.mjtGeom
-    near, length, height = conditions.ground_at, conditions.ground_length, conditions.ground_height
-    far = lengths.ground_reach
-    boxes = {
-        "step": {"step": (near, near + far, height)},
-        "hurdle": {"hurdle": (near, near + length, height)},
-        "gap": {"bank": (-far, near, 0.0), "far_bank": (near + length, near + length + far, 0.0)},
-    }
     pieces = {}  # name -> geom type, size and position
-    for name, (begin, end, top) in boxes.get(conditions.ground, {}).items():
+    for i, (begin, end, top) in enumerate(blocks(conditions)):
         half = (top + lengths.shortest_leg) / 2
         size = (end - begin) / 2, lengths.ground_half_width, half
-        pieces[name] = kinds.mjGEOM_BOX, size, ((begin + end) / 2, 0.0, top - half)
-    if conditions.ground == "gap":
-        spec.geom(body.ground).pos[2] -= lengths.shortest_leg
+        pieces[f"block_{i}"] = kinds.mjGEOM_BOX, size, ((begin + end) / 2, 0.0, top - half)
+    spec.geom(body.ground).pos[2] += _floor(conditions)
     if conditions.ground == "rough":
         # Bumps are spheres, since a sphere pushes a fast foot up and out. A height field consists of prisms: if a foot
         # is deeper than its distance from the side of a prism, it is pushed into the next prism and stays there.
@@ -53,33 +42,52 @@ def lay_ground(spec: mujoco.MjSpec, conditions: Conditions) -> None:
                 setattr(pair, setting, getattr(with_plane[frozenset((body.ground, touching))], setting))
 
 
+def blocks(conditions: Conditions) -> list[tuple[float, float, float]]:
+    """Return where each block of the ground begins and ends in the direction of walking, and its height [mm]."""
+    near, length, height = conditions.ground_at, conditions.ground_length, conditions.ground_height
+    far = conditions.body.lengths.ground_reach
+    match conditions.ground:
+        case "step":
+            return [(near, near + far, height)]
+        case "stairs":
+            return [(near + i * length, near + far, (i + 1) * height) for i in range(STAIRS)]
+        case "hurdle":
+            return [(near, near + length, height)]
+        case "gap":
+            return [(-far, near, 0.0), (near + length, near + length + far, 0.0)]
+    return []
+
+
 def ground_level(conditions: Conditions, places: np.ndarray) -> np.ndarray:
     """Return the height of the ground at places in the world, (..., 2) -> (...) [mm]; 0 on the plane."""
-    lengths = conditions.body.lengths
     x = places[..., 0]
     if conditions.ground == "rough":
         centres, heights, radii = _bumps(conditions)
         off = np.linalg.norm(places[..., None, :] - centres, axis=-1)
         caps = np.sqrt(np.maximum(radii**2 - off**2, 0.0)) - (radii - heights)
         return np.maximum(caps.max(axis=-1), 0.0)
-    end = np.inf if conditions.ground == "step" else conditions.ground_at + conditions.ground_length
-    height = {"flat": 0.0, "gap": -lengths.shortest_leg}.get(conditions.ground, conditions.ground_height)
-    return np.where((x > conditions.ground_at) & (x < end), height, 0.0)
+    level = np.full(x.shape, _floor(conditions))
+    for begin, end, top in blocks(conditions):
+        level = np.where((x > begin) & (x < end), np.maximum(level, top), level)
+    return level
 
 
 def beyond_the_ground(conditions: Conditions, feet: np.ndarray) -> np.ndarray:
     """Return whether feet with centres in the world, (..., 3) [mm], are beyond the edges of the ground, (...).
 
-    Only the kinds of ground in `WITH_ENDS` have edges.
+    Only ground with blocks has edges; behind a hurdle and before other obstacles, the plane goes on.
     """
-    lengths = conditions.body.lengths
-    x, y, near, far = feet[..., 0], feet[..., 1], conditions.ground_at, lengths.ground_reach
-    if conditions.ground not in WITH_ENDS:
-        return np.zeros(x.shape, dtype=bool)
-    past = {"hurdle": near + conditions.ground_length, "gap": near + conditions.ground_length + far, "step": near + far}
-    begin, end = -far if conditions.ground == "gap" else near, past[conditions.ground]
-    aside = (np.abs(y) > lengths.ground_half_width) & (x > begin) & (x < end)
-    return aside | ((x > end) & (conditions.ground != "hurdle")) | ((x < begin) & (conditions.ground == "gap"))
+    x, y, beyond = feet[..., 0], feet[..., 1], np.zeros(feet.shape[:-1], dtype=bool)
+    if not (pieces := blocks(conditions)):
+        return beyond
+    first, last = pieces[0][0], max(end for _, end, _ in pieces)
+    aside = (np.abs(y) > conditions.body.lengths.ground_half_width) & (x > first) & (x < last)
+    return aside | ((x > last) & (conditions.ground != "hurdle")) | ((x < first) & (conditions.ground == "gap"))
+
+
+def _floor(conditions: Conditions) -> float:
+    """Return the height of the plane [mm]: 0, or below the banks of a gap."""
+    return -conditions.body.lengths.shortest_leg if conditions.ground == "gap" else 0.0
 
 
 def depth_in_ground(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:
@@ -87,19 +95,15 @@ def depth_in_ground(conditions: Conditions, feet: np.ndarray, radius: float) -> 
 
     The depth is MuJoCo's, along the normal of the contact; it is negative above the ground.
     """
-    lengths = conditions.body.lengths
-    z = feet[..., 2]
-    if conditions.ground == "flat":
-        return radius - z
-    x, near, length = feet[..., 0], conditions.ground_at, conditions.ground_length
+    x, z = feet[..., 0], feet[..., 2]
     if conditions.ground == "rough":
         return np.maximum(radius - z, _depth_in_bumps(conditions, feet, radius))
-    off_middle = np.abs(x - near - length / 2)
-    outside = {"step": near - x, "hurdle": off_middle - length / 2, "gap": length / 2 - off_middle}[conditions.ground]
-    above = z - (0.0 if conditions.ground == "gap" else conditions.ground_height)
-    from_block = np.hypot(np.maximum(outside, 0.0), np.maximum(above, 0.0)) + np.minimum(np.maximum(outside, above), 0)
-    floor = -lengths.shortest_leg if conditions.ground == "gap" else 0.0
-    return radius - np.minimum(from_block, z - floor)
+    height = z - _floor(conditions)
+    for begin, end, top in blocks(conditions):
+        outside, above = np.maximum(begin - x, x - end), z - top
+        corner = np.hypot(np.maximum(outside, 0.0), np.maximum(above, 0.0))
+        height = np.minimum(height, corner + np.minimum(np.maximum(outside, above), 0.0))
+    return radius - height
 
 
 def _depth_in_bumps(conditions: Conditions, feet: np.ndarray, radius: float) -> np.ndarray:

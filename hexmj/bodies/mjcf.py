@@ -152,6 +152,10 @@ def _compiled(conditions: Conditions, looks: bool, pushes: bool, mjcf: bytes) ->
     model.site_type[feet], radius = mujoco.mjtGeom.mjGEOM_SPHERE, model.geom(body.feet[0]).size[0]
     model.site_size[feet, 0] = radius + radius / 10  # a touch sensor counts only contacts within its site
     check(model, body, finished=True)
+    if conditions.softness:
+        model.pair_solref[:, 0] = conditions.softness / 1000.0
+    if conditions.pitch or conditions.roll:
+        model.opt.gravity[:] = np.multiply(gravity(body), conditions.down)
     if conditions.leg_mass != 1.0 or conditions.centre_of_mass != 0.0:
         _redistribute(model, conditions)
     return CompiledBody.of(model, conditions)

@@ -110,7 +110,7 @@ class StudyCommand(Command):
     """A command that runs a study, writes its result and figures, and prints tables."""
 
     study: ClassVar[str]
-    """Place of the study's dataclass, such as "studies.terrain:Terrain"."""
+    """Place of the study's dataclass, such as "studies.biology:Biology"."""
     data: ClassVar[str]
     """Name of the NetCDF file; an option in braces, as in "{over}.nc", is replaced by its value."""
     figures: ClassVar[Mapping[str, str]]

@@ -1,89 +1,20 @@
-"""`hexmj league`, `hexmj search` and `hexmj check-controller`."""
+"""`hexmj search` and `hexmj check-controller`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from hexmj.cli.command import Answer, Command, StudyCommand, filmed
+from hexmj.cli.command import Answer, Command
 from hexmj.cli.measures import check_measure
-from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules, option_fields
+from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules
 from hexmj.cli.output import interval, report_checks, table
 from hexmj.errors import InputError
 from hexmj.timing import Stride
-from hexmj.validate import distinct
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-FILMED = 6
-"""Maximum number of controllers in the film."""
-
-QUICK: dict[str, Any] = {"velocity": (0.1, 0.5, 0.9), "starts": 200, "physical_starts": 8, "trial_starts": 4}
-"""Option -> its default in a quick league."""
-
-
-@dataclass(frozen=True)
-class LeagueOptions:
-    """Options of `hexmj league` that its study does not have."""
-
-    controllers: tuple[str, ...] | None = None
-    """Controllers that take part, by default all of the league."""
-    quick: bool = False
-    """Run a small league: four controllers, V = 0.1, 0.5 and 0.9, 200 starts, of which 8 walk in physics and 4 in each
-    trial. Values that you give for these options take precedence."""
-    no_video: bool = False
-    """Write no film."""
-
-
-class League(StudyCommand):
-    """Compare controllers from the literature and your own on the same starts: in kinematic walks, in physics and in
-    trials. Write tables, figures and a film. Repeat the command to resume a stopped run."""
-
-    study = "studies.league:League"
-    own = (LeagueOptions,)
-    planning = ()
-    hidden = ("periods",)
-    data = "league.nc"
-    figures = {"league": "league", "league_walks": "walks", "prediction": "prediction"}  # noqa: RUF012
-    examples = ("--quick", "--controller ldvs mine.py:Mine --velocity 0.5 --no-video")
-
-    def build(self, given: SimpleNamespace) -> Any:
-        from hexmj.studies.league import League
-        from hexmj.studies.league_cells import EVERYONE, FOUR, entrants
-
-        names = (FOUR if given.quick else EVERYONE) if given.controller is None else given.controller
-        distinct("--controller", names)
-        given.entrants = entrants(names)
-        given.controller = names
-        if given.quick:
-            defaults = {option.name: option.default for option in option_fields(League, "")}
-            vars(given).update((name, value) for name, value in QUICK.items() if vars(given)[name] == defaults[name])
-        return build(League, given, controllers=given.entrants)
-
-    def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
-        from hexmj.studies.standings import tables
-
-        for ranking in tables(result):
-            yield ranking.title
-            yield table(ranking.head, ranking.rows)
-
-    def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
-        """Write the tables as Markdown, and a film of the best controllers, which walk in physics from start 0."""
-        from hexmj.files import write_text
-        from hexmj.replay.film import Film
-        from hexmj.replay.recording import Start
-        from hexmj.studies.standings import by_rank, league_markdown
-
-        files = [write_text(given.out / "league.md", league_markdown(result))]
-        if given.no_video:
-            return files
-        best = by_rank(result).entrant.values.tolist()
-        start: Any = {"velocity": given.trial_velocity, "start": 0, "acceleration": None}
-        walks = {name: build(Start, given, controller=given.entrants[name], **start) for name in best[:FILMED]}
-        shown = [walk.recorded(True, name, given.threads) for name, walk in walks.items()]
-        return files + filmed(given.out / "league.mp4", shown, Film(width=480, height=360))
+    pass
 
 
 @dataclass(frozen=True)

@@ -28,19 +28,17 @@ Look
   export            joint angles, torques, forces and tips of recordings as CSV
   view              a walk or a recording in a window or a browser
 
-Studies
-  map               physical FLSS over the velocity and one condition
-  disturb           walks with a halt, a stopped leg or a push
-  terrain           falls at steps, gaps, hurdles and on rough ground
-  biology           forces, gait, posture and work compared with insects
+Tasks
+  task              walks on command, over terrain, with pushes and lost legs
+  league            all controllers in fourteen tasks: tables and figures
 
 Controllers
-  league            all controllers on the same starts: tables, figures, film
   search            parameters that minimise the FLSS
   check-controller  interface checks of a controller
 
-Paper
+Literature
   reproduce         the claims and figures of the 1998 paper
+  biology           forces, gait, posture and work compared with insects
 
 Machine
   doctor            checks of this machine, each with a remedy
@@ -53,9 +51,9 @@ Machine
 MODULES = {
     "measures": ("walk", "flss", "compare"),
     "pictures": ("render", "page", "export", "view"),
-    "studies": ("map", "disturb", "terrain", "biology"),
-    "controllers": ("league", "search", "check-controller"),
-    "paper": ("reproduce",),
+    "tasks": ("task", "league"),
+    "controllers": ("search", "check-controller"),
+    "paper": ("reproduce", "biology"),
     "machine": ("doctor", "rerun"),
 }
 """Module of `hexmj.cli` -> its commands. The class of `check-controller` is `CheckController`."""

@@ -83,15 +83,6 @@ def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column
     return table((*axes, *columns), rows, len(axes))
 
 
-def over_velocity(result: "xr.Dataset", text: Callable[["xr.Dataset"], str]) -> dict[str, Column]:
-    """Return a column for each velocity, for `grid`; `text` makes a cell from the data at the velocity."""
-
-    def column(v: float) -> Column:
-        return lambda data: text(data.sel(velocity=v))
-
-    return {f"V = {v:g}": column(v) for v in result.velocity.values}
-
-
 def _text(data: "xr.Dataset", column: Column) -> str:
     """Return the text of a cell; if `column` names a variable, its number and, if the data have it, its interval."""
     if not isinstance(column, str):

@@ -1,12 +1,17 @@
-"""The command `hexmj reproduce`."""
+"""`hexmj reproduce` and `hexmj biology`: comparisons with the literature."""
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
-from hexmj.cli.command import Answer, Command, at_work
+from hexmj.cli.command import Answer, Command, StudyCommand, at_work
 from hexmj.cli.options import Output, Workers, build
-from hexmj.cli.output import table
+from hexmj.cli.output import lists_of, table
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -39,3 +44,33 @@ class Reproduce(Command):
         about = "walk, start: observation times; *: calibrates a constant of hexmj; claims.md: intervals and reasons"
         lines = [starts, table(*report.table(short=True), None), about, *report.summary]
         return Answer(report.json(), lines, report.files, settings)
+
+
+class Biology(StudyCommand):
+    """Compare forces, torques, gait, posture and work of the simulated insect with measurements of real insects. Repeat
+    the command to resume a stopped run."""
+
+    study = "studies.biology:Biology"
+    data = "biology.nc"
+    figures = {"biology": "biology"}  # noqa: RUF012
+    examples = ("--starts 5", "--controller walknet --vp 120 --out results/walknet")
+
+    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
+        return lists_of(result.drop_dims(("start", "speed", "quantity")))
+
+    def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
+        from hexmj.studies.biology import table_rows, walked_in_words
+
+        rows = [row[:4] for row in table_rows(result)]
+        known = [row for row in rows if row[2] != "-"]
+
+        yield f"{study.controller.name} and real insects, at 24 mm/s unless a row names another speed"
+        yield table(("quantity", "ours (95 %)", "insects", "verdict"), known, None)
+        yield f"biology.md has the sources, and {len(rows) - len(known)} more quantities without a figure for insects"
+        yield f"Starts with complete strides: {walked_in_words(result)}"
+
+    def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
+        from hexmj.files import write_text
+        from hexmj.studies.biology import biology_markdown
+
+        return [write_text(given.out / "biology.md", biology_markdown(result))]

@@ -122,7 +122,8 @@ class Controller(Protocol):
 
     An attribute `mirrored = True` promises that starts mirrored in the body axis give mirrored walks to the last bit;
     `conformance` checks it. A method `check_velocity(velocity, stride)` may raise InputError before a walk is planned
-    if the time step is too long for V_r.
+    if the time step is too long for V_r. A method `after_loss(leg, time)` returns a controller that walks without a leg
+    from a time on, when the loss of the leg is announced.
     """
 
     @property

@@ -59,6 +59,8 @@ class WrappedPlan:
         """Wrap a plan that is at time 0."""
         self.starts, self.stride, self.done = plan.starts, plan.stride, plan.done
         self._plan, self.made_for = plan, getattr(plan, "made_for", None)
+        if hasattr(plan, "y"):
+            self.y = plan.y
 
     def set_velocity(self, velocity: np.ndarray) -> None:
         """See `protocol.SteerablePlan`."""
@@ -133,7 +135,7 @@ class LatePlan(WrappedPlan):
 
 @dataclass(frozen=True)
 class LegLost(Wrapper):
-    """A controller that plans for six legs although one leg is lost: the lost leg is held in the air.
+    """A controller that plans for six legs although one leg is lost: from then on, the leg is held in the air.
 
     A body that tips far enough toward the lost leg still lands on it.
     """
@@ -142,11 +144,14 @@ class LegLost(Wrapper):
     """Index of the lost leg."""
     held: float = 12.0
     """Height at which the lost leg is held [mm]; kinematic results do not depend on it."""
+    time: float = 0.0
+    """Time at which the leg is lost [time units]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         whole("leg", self.leg, 0, 5)
         number("held", self.held, 1e-6, 1e6)
+        number("time", self.time, 0.0)
 
     @property
     def name(self) -> str:
@@ -155,25 +160,26 @@ class LegLost(Wrapper):
 
     def wrap(self, plan: Any) -> "LamePlan":
         """Return a `LamePlan` around a plan at time 0."""
-        return LamePlan(plan, self.leg, self.held)
+        return LamePlan(plan, self.leg, self.held, self.time)
 
 
 class LamePlan(WrappedPlan):
     """A plan that holds one leg up; the wrapped plan senses all six legs, including the lost one."""
 
-    def __init__(self, plan: Any, leg: int, held: float) -> None:
-        """Wrap a plan that is at time 0; `leg` is the index of the lost leg, `held` its height [mm]."""
+    def __init__(self, plan: Any, leg: int, held: float, time: float) -> None:
+        """Wrap a plan that is at time 0; see `LegLost` for the other arguments."""
         super().__init__(plan)
-        self._leg, self._held = leg, held
+        self._leg, self._held, self._time = leg, held, time
         if isinstance(plan, FeedbackPlan):
             self.sense = plan.sense
 
     def advance(self, steps: int) -> PlannedWalk:
         """Return the next steps, in which the lost leg moves forward and back in the air."""
         walk = super().advance(steps)
-        stance, height = walk.stance.copy(), walk.height.copy()
-        stance[..., self._leg] = False
-        height[..., self._leg] = self._held * np.minimum(walk.time / (self._held / RISE), 1.0)[:, None]
+        stance, height, since = walk.stance.copy(), walk.height.copy(), walk.time - self._time
+        lost = since > 0.0
+        stance[lost, :, self._leg] = False
+        height[lost, :, self._leg] = self._held * np.minimum(since[lost] / (self._held / RISE), 1.0)[:, None]
         return replace(walk, stance=stance, height=height)
 
 

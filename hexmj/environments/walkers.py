@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.bodies.ground import WITH_ENDS, beyond_the_ground
+from hexmj.bodies.ground import beyond_the_ground, blocks
 from hexmj.bodies.kinematics import standing_tips
 from hexmj.controllers.planning import advanced
 from hexmj.controllers.planning import begin as begin_plan
@@ -181,7 +181,7 @@ class Walkers:
         self._senses.feel(ids, shown["sensors"], shown["force"])
         time, result = (self._done, self._steps), tuple(acted)
         ended = end_step(self._passed[0], ids, shown["sensors"], self._trunk, self._command, time, result)
-        if self._task.conditions.ground in WITH_ENDS:
+        if blocks(self._task.conditions):
             feet = self.places.sensors[ids, self._compiled.columns.foot].reshape(-1, 6, 3)
             beyond = beyond_the_ground(self._task.conditions, feet).any(axis=1)
             acted.truncated[ids] |= beyond & ~acted.terminated[ids]

@@ -22,7 +22,9 @@ UNITS: dict[str, str] = {
     "vp": "mm/s",
     **dict.fromkeys(("step_height", "standing_height", "centre_of_mass", "ground_height"), "mm"),
     **dict.fromkeys(("ground_at", "ground_length", "aep0", "pep0", "pep_min"), "mm"),
+    **dict.fromkeys(("pitch", "roll"), "rad"),
     **dict.fromkeys(("lift_time", "landing_time", "longest_substep", "contact_gap", "settling_time"), "ms"),
+    "softness": "ms",
 }
 """Field of `Conditions` or `Stride` -> its unit; the other fields are plain numbers or names."""
 

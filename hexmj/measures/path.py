@@ -26,6 +26,8 @@ class PathOutcomes:
     """(start,) mean velocity to the left in the frame of the root, as a fraction of V_p."""
     turn: np.ndarray
     """(start,) mean yaw rate [rad / time unit]."""
+    way: np.ndarray
+    """(start,) distance in the commanded direction, which turns with the root [mm]."""
 
 
 class PathSoFar:
@@ -34,8 +36,9 @@ class PathSoFar:
     def __init__(self, settled: Settled, steps: int) -> None:
         """Begin with the roots at rest; `steps` is the number of plan steps of the walk."""
         self._m, self._dt = settled.substeps, settled.stride.dt
-        self._pose = np.full((steps + 1, len(settled.starts), 3), np.nan)
-        self._pose[0] = poses_of(settled.state[:, :7])
+        self.poses = np.full((steps + 1, len(settled.starts), 3), np.nan)
+        """x, y [mm] and heading [rad] of the roots from time 0 on, (step, start, 3); NaN after a fall."""
+        self.poses[0] = poses_of(settled.state[:, :7])
 
     def add(self, chunk: Chunk) -> None:
         """Add one chunk of `rollout.drive`."""
@@ -43,11 +46,11 @@ class PathSoFar:
         ends = substep[((chunk.first + substep) % self._m == 0) & (chunk.first + substep > 0)]
         poses = poses_of(chunk.qpos[:, ends, :7])
         poses[ends >= chunk.valid[:, None]] = np.nan
-        self._pose[np.ix_((chunk.first + ends) // self._m, chunk.ids)] = poses.swapaxes(0, 1)
+        self.poses[np.ix_((chunk.first + ends) // self._m, chunk.ids)] = poses.swapaxes(0, 1)
 
     def outcomes(self, command: Command) -> PathOutcomes:
         """Return the outcomes of walks by one command."""
-        return path_outcomes(self._pose, np.arange(len(self._pose)) * self._dt, command)
+        return path_outcomes(self.poses, np.arange(len(self.poses)) * self._dt, command)
 
 
 def path_outcomes(poses: np.ndarray, time: np.ndarray, command: Command) -> PathOutcomes:
@@ -62,20 +65,26 @@ def path_outcomes(poses: np.ndarray, time: np.ndarray, command: Command) -> Path
 
     path = command.path(time)
     ways = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))])
+    poses = np.ascontiguousarray(poses.swapaxes(0, 1))  # with steps last, sums do not depend on the other starts
     known = np.isfinite(poses[..., 0])
-    last, each = known.sum(axis=0) - 1, np.arange(poses.shape[1])
-    place, angle = poses[..., 0] + 1j * poses[..., 1], np.unwrap(np.where(known, poses[..., 2], 0.0), axis=0)
-    moved = (place - place[0]) * np.exp(-1j * angle[0])
+    last, each = known.sum(axis=1) - 1, np.arange(len(poses))
+    place, angle = poses[..., 0] + 1j * poses[..., 1], np.unwrap(np.where(known, poses[..., 2], 0.0), axis=1)
+    moved = (place - place[:, :1]) * np.exp(-1j * angle[:, :1])
     away, _ = cKDTree(path[:, :2]).query(np.nan_to_num(np.stack([moved.real, moved.imag], axis=-1)))
-    ahead = np.nansum(np.diff(place, axis=0) * np.exp(-0.5j * (angle[:-1] + angle[1:])), axis=0)
+    moved = np.diff(place, axis=1) * np.exp(-0.5j * (angle[:, :-1] + angle[:, 1:]))
+    ahead = np.nansum(moved, axis=1)
+    forward, left, _ = command.parts[np.searchsorted(command.times, time[:-1], side="right") - 1].T
+    speed = np.hypot(forward, left)
+    aim = np.divide(forward + 1j * left, speed, out=np.zeros(len(speed), complex), where=speed > 0)
     duration = np.maximum(time[last], time[1])
     return PathOutcomes(
-        path_distance=np.sqrt((away**2 * known).sum(axis=0) / known.sum(axis=0)),
+        path_distance=np.sqrt((away**2 * known).sum(axis=1) / known.sum(axis=1)),
         path_length=ways[last],
-        heading_error=angle[last, each] - angle[0] - path[last, 2],
+        heading_error=angle[each, last] - angle[:, 0] - path[last, 2],
         forward=ahead.real / duration,
         left=ahead.imag / duration,
-        turn=(angle[last, each] - angle[0]) / duration,
+        turn=(angle[each, last] - angle[:, 0]) / duration,
+        way=np.nansum((moved * aim.conj()).real, axis=1),
     )
 
 

@@ -117,7 +117,7 @@ def physical_walk_of_plan(
     plan: Plan,
     planned: PlannedWalk,
     *,
-    push: Push | None = None,
+    pushes: Sequence[Push] = (),
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> PhysicalWalk:
@@ -128,7 +128,7 @@ def physical_walk_of_plan(
     """
     stride, so_far = settled.stride, WalkSoFar(settled, planned, threads)
     followed: list[PlannedWalk] = []
-    for chunk in drive(settled, plan, float(planned.time[-1]), push=push, threads=threads, progress=progress):
+    for chunk in drive(settled, plan, float(planned.time[-1]), pushes=pushes, threads=threads, progress=progress):
         so_far.add(chunk)
         if isinstance(plan, FeedbackPlan):
             followed.append(chunk.plan)
@@ -181,14 +181,14 @@ def outcomes_of_plan(
     planned_loss: np.ndarray,
     dynamic_loss: np.ndarray | None = None,
     *,
-    push: Push | None = None,
+    pushes: Sequence[Push] = (),
     effort: EffortSoFar | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Outcomes:
     """Return the outcomes of the physical walks of a plan at time 0, whose planned losses, (start,), are known."""
     so_far = OutcomesSoFar(settled, planned_loss, dynamic_loss)
-    for chunk in drive(settled, plan, duration, push=push, threads=threads, progress=progress):
+    for chunk in drive(settled, plan, duration, pushes=pushes, threads=threads, progress=progress):
         so_far.add(chunk)
         if effort:
             effort.add(chunk)

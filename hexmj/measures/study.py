@@ -23,7 +23,6 @@ from hexmj.validate import choice, distinct
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hexmj.measures.physical import PhysicalWalk
     from hexmj.physics.settle import Settled
 
 GROUND = "ground", "ground_height", "ground_at", "ground_length", "ground_seed"
@@ -144,18 +143,6 @@ def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Str
     return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
 
 
-@lru_cache(maxsize=1)
-def standing_starts(
-    n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None
-) -> np.ndarray:
-    """Return the indices of a seed's starts that come to rest on six feet; cached, since all velocities share them."""
-    from hexmj.physics.settle import settle
-
-    starts, everyone = draw_starts(n_starts, seed, stride), np.arange(n_starts)
-    parts = [part for part, _ in by_halves(everyone, lambda part: settle(starts[part], conditions, stride, threads))]
-    return np.concatenate([everyone[:0], *parts])
-
-
 def by_halves(
     which: np.ndarray, walk: Callable[[np.ndarray], Any], diverging: bool = False
 ) -> Iterator[tuple[np.ndarray, Any]]:
@@ -176,14 +163,6 @@ def by_halves(
             raise
         for half in np.array_split(which, 2) if len(which) > 1 else ():
             yield from by_halves(half, walk, diverging)
-
-
-def kept_walk(walks: WalkSettings, starts: np.ndarray, **execution: Any) -> "PhysicalWalk":
-    """Return every step of the physical walks from `starts`, (start, leg) [mm]; `execution`: threads and progress."""
-    from hexmj.measures.physical import physical_walk
-
-    how: Any = {"conditions": walks.conditions, "stride": walks.stride, "acceleration": walks.acceleration}
-    return physical_walk(starts, walks.controller, walks.velocity, walks.duration, **how, **execution)
 
 
 def outcome_table(

@@ -11,7 +11,6 @@ from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.starts import SAMPLE, checked_list, draw_starts
 from hexmj.stats import paired_difference, wilson_intervals
-from hexmj.sweep import over_axes
 from hexmj.timing import Acceleration, Stride, check_reached, observation_duration, steps_within
 
 if TYPE_CHECKING:
@@ -154,12 +153,6 @@ def frequency_table(
 def happened(time: "xr.DataArray") -> "xr.DataArray":
     """Return 1 where an event has a finite time, 0 where its time is inf, and NaN where its walk failed."""
     return (time < np.inf).where(time.notnull())
-
-
-def over_cells(sizes: Mapping[str, int], data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-    """Combine cells over axes as `over_axes` does; starts and variables that are missing in a cell become NaN."""
-    numbered = [cell.assign_coords(start=np.arange(cell.sizes.get("start", 0))) for cell in data]
-    return over_axes(sizes, numbered, join="outer", data_vars="all").transpose(*sizes, "start")
 
 
 def frequency(name: str, events: np.ndarray, dims: Dims) -> dict[str, Any]:

@@ -18,8 +18,7 @@ from hexmj.legs import LEGS
 from hexmj.measures.kinematic import first_loss
 from hexmj.phases import PAIRS
 from hexmj.starts import draw_starts
-from hexmj.studies.disturbed_plans import Disturbed, collect_postures
-from hexmj.studies.disturbed_walks import disturbance_of, find_stable_starts
+from hexmj.tasks.disturbed import Disturbance, Disturbed, collect_postures, find_stable_starts
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
 
 if TYPE_CHECKING:
@@ -157,7 +156,7 @@ def losses_after(
         InputError: too few starts are stable until the obstacle, or no start has a stable gait that provides postures.
     """
     stable = find_stable_starts(controller, velocity, n_starts, seed, stride, grid=1)
-    halt = disturbance_of(stable, "halt", controller, velocity, stride)
+    halt = Disturbance("halt", stable.step, stable.draw)
     postures = collect_postures(controller, velocity, seed, stride) if answer in ("positions", "postures") else None
     if postures and answer == "positions":
         postures = replace(postures, standing=np.ones_like(postures.standing))

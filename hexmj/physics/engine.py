@@ -97,7 +97,7 @@ class MujocoBatch:
     qvel: np.ndarray
     """(start, velocity) current velocities."""
     push: np.ndarray
-    """(start,) force on the root to the left [g mm/s^2]; 0 unless the caller sets it."""
+    """(start, 2) force on the root, ahead and to the left in the world [g mm/s^2]; 0 unless the caller sets it."""
 
     def __init__(self, compiled: CompiledBody, count: int, threads: int | None) -> None:
         """Create `count` bodies, which `threads` threads step, by default one per core."""
@@ -112,7 +112,7 @@ class MujocoBatch:
         self._state = [self._batch.bind(name) for name in STATE]
         self._ends = np.cumsum([values.shape[1] for values in self._state])[:-1]
         self.qpos, self.qvel = self._state[:2]
-        self.push = self._batch.bind("xfrc_applied")[:, compiled.root, 1]
+        self.push = self._batch.bind("xfrc_applied")[:, compiled.root, :2]
         self.sensors, self._foot = self._batch.bind("sensordata"), compiled.columns.foot
         self.force = self._batch.bind("actuator_force")
         servos, speeds = compiled.columns.ctrl, compiled.columns.qvel.start + model.nq

@@ -251,10 +251,13 @@ def measured_walk(chunk: Chunk, settled: Settled, rows: np.ndarray | None = None
     rows = np.arange(len(chunk.ids)) if rows is None else rows
     substep = np.arange(chunk.qpos.shape[1])
     shown = substep[((chunk.first + substep) % m == 0) & (chunk.first + substep > 0)]
-    shape = len(shown), len(rows)
+    shape, (ahead, left, down) = (len(shown), len(rows)), settled.conditions.down
+    lean = -ahead / down, -left / down
     x, y, stance = np.full((*shape, 6), np.nan), np.full((*shape, 6), np.nan), np.zeros((*shape, 6), dtype=bool)
     centre, places = np.full((*shape, 3), np.nan), (columns.foot.start, columns.centre_of_mass.start)
-    _measure((chunk.qpos, chunk.sensors, chunk.standing, chunk.valid), rows, shown, places, (x, y, stance, centre))
+    _measure(
+        (chunk.qpos, chunk.sensors, chunk.standing, chunk.valid), rows, shown, places, lean, (x, y, stance, centre)
+    )
     time, velocity = (chunk.first + shown) // m * stride.dt, np.full(shape, np.nan)
     walk = Walk(time, velocity, x - np.array(stride.geometry.origin), y, stance, stride.geometry)
     feet = chunk.sensors[rows, shown[:, None], columns.foot].reshape(*shape, 6, 3)
@@ -340,8 +343,11 @@ def _count_misses(qpos: Any, feet: Any, targets: Any, scale: Any, counts: Any) -
 
 
 @jitted
-def _measure(chunk: Any, rows: Any, shown: Any, places: Any, walk: Any) -> None:
-    """Write the feet until the fall to `walk`: relative to the centre of mass, along the root's heading."""
+def _measure(chunk: Any, rows: Any, shown: Any, places: Any, lean: Any, walk: Any) -> None:
+    """Write the feet until the fall to `walk`: relative to the centre of mass, along the root's heading.
+
+    The centre of mass is projected along gravity to z = 0, by `lean` times its height.
+    """
     qpos, sensors, standing, valid = chunk
     foot, centre_of_mass = places
     x, y, stance, centre = walk
@@ -355,9 +361,11 @@ def _measure(chunk: Any, rows: Any, shown: Any, places: Any, walk: Any) -> None:
             cosine, sine = along / length, across / length
             for axis in range(3):
                 centre[n, i, axis] = sensors[row, column, centre_of_mass + axis]
+            below_x = centre[n, i, 0] + lean[0] * centre[n, i, 2]
+            below_y = centre[n, i, 1] + lean[1] * centre[n, i, 2]
             for leg in range(6):
-                forward = sensors[row, column, foot + 3 * leg] - centre[n, i, 0]
-                left = sensors[row, column, foot + 3 * leg + 1] - centre[n, i, 1]
+                forward = sensors[row, column, foot + 3 * leg] - below_x
+                left = sensors[row, column, foot + 3 * leg + 1] - below_y
                 x[n, i, leg] = cosine * forward + sine * left
                 y[n, i, leg] = cosine * left - sine * forward
                 stance[n, i, leg] = standing[row, column, leg]

@@ -1,7 +1,7 @@
-"""Pushes from the side: their impulses, times and durations."""
+"""Pushes on the root: their impulses, directions, times and durations."""
 
 from dataclasses import dataclass
-from math import gcd
+from math import cos, gcd, pi, sin
 
 import numpy as np
 
@@ -32,12 +32,19 @@ def can_push(conditions: Conditions, stride: Stride, observation_time: float = n
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """Pushes from the side on the root body, at most one per start; each lasts `PUSH_LASTS`, in whole plan steps."""
+    """A horizontal push on the root body of each start; it lasts `PUSH_LASTS`, in whole plan steps."""
 
     impulse: np.ndarray
-    """(start,) impulse to the left [g mm/s]; 0 means no push."""
+    """(start,) impulse [g mm/s]; 0 means no push."""
     time: np.ndarray
     """(start,) time at which the push begins, rounded down to a step of the plan [time units]."""
+    direction: float = pi / 2
+    """Direction of the impulse relative to the heading at time 0: 0 ahead, pi / 2 to the left [rad]."""
+
+    @property
+    def vector(self) -> np.ndarray:
+        """(start, 2) impulse ahead and to the left in the world [g mm/s]."""
+        return self.impulse[:, None] * np.round([cos(self.direction), sin(self.direction)], 15)
 
     def begins(self, stride: Stride) -> np.ndarray:
         """Return the number of plan steps before each push, (start,)."""

@@ -9,7 +9,7 @@ Of a fine step (`substeps`) it records the first part, but means of the ground's
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -75,7 +75,7 @@ def drive(
     plan: Plan,
     duration: float,
     *,
-    push: Push | None = None,
+    pushes: Sequence[Push] = (),
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Chunk]:
@@ -85,7 +85,7 @@ def drive(
         settled: starts at rest.
         plan: plan of the same starts, at time 0.
         duration: observation time [time units].
-        push: push from the side at each start.
+        pushes: pushes of all starts.
         threads: number of threads, by default one per core; the result does not depend on it.
         progress: called with the fraction done since the last call.
 
@@ -95,11 +95,10 @@ def drive(
         SimulationError: a simulation diverged; the error has its last finite state.
         StillThrown: the observation time ends while a push still throws a start; raised after the last chunk.
     """
-    divisor = 0
-    if push:
+    for push in pushes:
         push.check_within(duration, settled.conditions, settled.stride, len(settled.starts))
-        divisor = push.divisor(settled.conditions, settled.stride)
-    rollout, orders = Rollout(settled, push, threads), OrdersFromPlan(settled, plan, duration, divisor)
+    divisor = math.gcd(*(push.divisor(settled.conditions, settled.stride) for push in pushes))
+    rollout, orders = Rollout(settled, pushes, threads), OrdersFromPlan(settled, plan, duration, divisor)
     total, reported, walking = orders.steps * settled.substeps, 0.0, np.arange(len(settled.starts))
     chunks = _with_feedback(rollout, plan, orders) if isinstance(plan, FeedbackPlan) else _planned(rollout, orders)
     for chunk in chunks:
@@ -109,7 +108,7 @@ def drive(
             progress(done - reported)
             reported = done
         walking = chunk.ids[~chunk.fell]
-    if push:
+    if pushes:
         rollout.check_landed(walking)
 
 
@@ -150,9 +149,9 @@ def next_orders(
 class Rollout:
     """Settled starts that carry out orders in MuJoCo."""
 
-    def __init__(self, settled: Settled, push: Push | None = None, threads: int | None = None) -> None:
+    def __init__(self, settled: Settled, pushes: Sequence[Push] = (), threads: int | None = None) -> None:
         """Put all starts at rest; `threads` threads step them, by default one per core."""
-        self.settled, self._push, self._columns = settled, push, settled.compiled.columns
+        self.settled, self._pushes, self._columns = settled, pushes, settled.compiled.columns
         self._pushed = np.zeros(len(settled.starts))  # sum of the impulses' sizes [g mm/s]
         self._batch = MujocoBatch(settled.compiled, len(settled.starts), threads)
         self._batch.put(np.arange(len(settled.starts)), settled.state)
@@ -241,15 +240,16 @@ class Rollout:
 
     def _apply_push(self, orders: Orders) -> None:
         """Apply the forces of all pushes that act when the orders begin, and no others."""
-        if self._push:
+        if self._pushes:
             self._batch.push[:] = 0.0
-        if self._push and self._push.impulse.any():
-            stride, seconds = self.settled.stride, self.settled.conditions.seconds(self.settled.stride)
-            first, lasts = orders.first // self.settled.substeps, steps_pushed(self.settled.conditions, stride)
-            begin = self._push.begins(stride)
-            now = (begin <= first) & (first < begin + lasts)
-            self._batch.push[:] = now * (self._push.impulse / (lasts * seconds))
-            self._pushed += (begin == first) * np.abs(self._push.impulse)
+        stride, conditions = self.settled.stride, self.settled.conditions
+        for push in self._pushes:
+            if push.impulse.any():
+                begin, first = push.begins(stride), orders.first // self.settled.substeps
+                lasts = steps_pushed(conditions, stride)
+                now = (begin <= first) & (first < begin + lasts)
+                self._batch.push[:] += now[:, None] * (push.vector / (lasts * conditions.seconds(stride)))
+                self._pushed += (begin == first) * np.abs(push.impulse)
 
 
 class Senses:

@@ -2,12 +2,13 @@
 
 If a body tips or a swing ends early, a foot comes down at 0.4 m/s and more. Such a foot moves 0.25 mm into the ground
 in one physics step, before the contact can act. It needs shorter steps, and contacts as hard as these steps allow.
-Only the few steps of the plan that need it are repeated.
+Only the few steps of the plan that need it are repeated. On soft ground, contacts act slowly, and no step needs it.
 
 Whether a step is repeated depends only on the body itself, so results do not depend on the rest of the batch. A body
 that diverges is an error, even in a step that would be repeated.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -113,8 +114,8 @@ class FineSteps:
 
 
 def allowed_depth(compiled: CompiledBody) -> float:
-    """Return the depth of a body's foot in the ground beyond which a step is repeated [mm]."""
-    return SINK * compiled.conditions.standing_height
+    """Return the depth of a body's foot in the ground beyond which a step is repeated [mm]; inf for soft ground."""
+    return math.inf if compiled.conditions.softness else SINK * compiled.conditions.standing_height
 
 
 def _overwrite(shown: Shown, rows: np.ndarray, begin: int, new: Shown) -> None:

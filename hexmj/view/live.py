@@ -29,7 +29,7 @@ ONLY = np.array([0])
 """Array with the index of the only insect of a live walk."""
 
 STRONGEST_PUSH = 80.0
-"""Maximum impulse of a push, the same as in `hexmj disturb` [body mass times V_p]."""
+"""Maximum impulse of a push, the same as in tasks [body mass times V_p]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ class LiveWalk:
         orders = OrdersFromPlan(settled, plan, MOST_STEPS * self.stride.dt)
         with self._restored_if_it_fails():
             self._plan, self._orders, self._push = plan, orders, Push(np.zeros(1), np.zeros(1))
-            self._rollout = Rollout(settled, self._push, threads=1)
+            self._rollout = Rollout(settled, [self._push], threads=1)
             self._push_steps = steps_in_chunk(settled.substeps)
             self.start, self.conditions, self.settled = start, conditions, settled
             self.trace, self.fell_on, self._time_left = [], "", 0.0

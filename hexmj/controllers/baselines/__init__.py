@@ -1,6 +1,7 @@
-"""Baseline controllers from the literature, one per file; all are built on the base class in `lifted`."""
+"""Baseline controllers from the literature, one per file; rules that lift legs build on the base class in `lifted`."""
 
 from hexmj.controllers.baselines.evolved import EVOLVED
+from hexmj.controllers.baselines.free_gait import FreeGait
 from hexmj.controllers.baselines.metronomes import Metronome, RandomPhase
 from hexmj.controllers.baselines.phase_oscillators import PhaseOscillators
 from hexmj.controllers.baselines.righetti import Righetti
@@ -25,6 +26,7 @@ BASELINES: dict[str, Controller] = {
         Righetti(),
         Tegotae(),
         EVOLVED,
+        FreeGait(),
     )
 }
 """Name -> baseline controller."""

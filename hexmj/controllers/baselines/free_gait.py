@@ -19,7 +19,7 @@ from hexmj.controllers.steered import Lines, feet_on
 from hexmj.jitted import jitted
 from hexmj.stability import margin_of
 from hexmj.starts import checked_velocities
-from hexmj.timing import Acceleration, Stride, commanded_velocities
+from hexmj.timing import AT_SPEED, Acceleration, Stride, commanded_velocities
 from hexmj.validate import number
 from hexmj.walks import PlannedWalk
 
@@ -29,7 +29,7 @@ EVERY = 5
 
 @dataclass(frozen=True)
 class FreeGait:
-    """A planner of stable steps, a `protocol.CommandedController`."""
+    """A planner of stable steps, a `protocol.CommandedController` and a `protocol.SteerableController`."""
 
     margin: float = 2.0
     """Minimum stability margin without a lifted leg, until its swing has ended [mm]."""
@@ -46,13 +46,18 @@ class FreeGait:
         v = checked_velocities(velocity, len(starts), acceleration)
         return FreePlan(self, starts, v, np.array([1.0, 0.0, 0.0]), stride, acceleration)
 
+    def begin_at_speed(self, starts, velocity, stride, acceleration=None, threads=None) -> "FreePlan":
+        """See `protocol.SteerableController.begin_at_speed`."""
+        v = checked_velocities(velocity, len(starts), acceleration)
+        return FreePlan(self, starts, v, np.array([1.0, 0.0, 0.0]), stride, acceleration, AT_SPEED)
+
     def begin_commanded(self, starts, command, stride, threads=None) -> "FreePlan":
         """See `protocol.CommandedController.begin_commanded`."""
         return FreePlan(self, starts, np.ones(len(starts)), np.asarray(command, dtype=float), stride)
 
 
 class FreePlan:
-    """The plan of a `FreeGait`, a `protocol.CommandedPlan`."""
+    """The plan of a `FreeGait`, a `protocol.CommandedPlan` and a `protocol.SteerablePlan`."""
 
     def __init__(
         self,
@@ -62,12 +67,14 @@ class FreePlan:
         command: np.ndarray,
         stride: Stride,
         acceleration: Acceleration | None = None,
+        age: int = 0,
     ) -> None:
         """Begin with feet that stand on the lines as `starts`, (start, leg) [mm], stand on the step range.
 
-        The body moves by the command times the velocity.
+        The body moves by the command times the velocity. The acceleration began `age` steps before.
         """
         self._settings, self._velocity, self._acceleration = settings, velocity, acceleration
+        self._age = np.full(len(starts), age)
         self.stride, self.done, self.made_for, self._origin = stride, 0, None, np.array(stride.geometry.origin)
         lines = Lines.of(command, stride)
         self._feet = feet_on(lines, starts, stride)
@@ -87,15 +94,45 @@ class FreePlan:
         rear = lines.neutral + (stride.pep0 - middle) * full - behind[:, None] * lines.direction
         self._lines = front, rear, lines.direction
 
+    @property
+    def tips(self) -> np.ndarray:
+        """See `protocol.SteerablePlan`."""
+        return self._feet[..., 0] - self._origin
+
+    @property
+    def standing(self) -> np.ndarray:
+        """See `protocol.SteerablePlan`."""
+        return self._stands
+
+    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        self._feet[..., 0] = np.where(tips == self.tips, self._feet[..., 0], tips + self._origin)
+        self._stands = standing
+
+    def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        legs = which[:, None]
+        self.see(np.where(legs, tips, self.tips), self._stands | legs)
+        self._goals = np.where(legs[..., None], self._feet, self._goals)
+        self.slow_down(which)
+
+    def slow_down(self, which: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        self._age[which] = 0
+
+    def set_velocity(self, velocity: np.ndarray) -> None:
+        """See `protocol.Plan`."""
+        self._velocity = velocity
+
     def advance(self, steps: int) -> PlannedWalk:
         """See `protocol.Plan`."""
-        v = np.array(commanded_velocities(self._velocity, self.done, steps, self.stride, self._acceleration))
+        v = np.array(commanded_velocities(self._velocity, self._age, steps, self.stride, self._acceleration))
         twists = v[..., None] * self._command
         shape = (*v.shape, 6)
         feet, goals, stance = np.empty((*shape, 2)), np.empty((*shape, 2)), np.empty(shape, dtype=bool)
         state, limits = (self._feet, self._goals, self._stands), (self._settings.margin, self._settings.least_step)
-        _plan(state, twists, self._lines, limits, self.stride.dt, self.done, (feet, goals, stance))
-        self.done += steps
+        _plan(state, twists, self._lines, limits, self.stride.dt, self._age, (feet, goals, stance))
+        self.done, self._age = self.done + steps, self._age + steps
         time = np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt
         tips = {"x": feet[..., 0] - self._origin, "y": feet[..., 1], "stance": stance}
         aims = {"aep": goals[..., 0] - self._origin, "aep_y": goals[..., 1], "height": np.broadcast_to(np.nan, shape)}
@@ -105,7 +142,7 @@ class FreePlan:
 
 
 @jitted
-def _plan(state: Any, twists: Any, lines: Any, limits: Any, dt: float, done: int, out: Any) -> None:
+def _plan(state: Any, twists: Any, lines: Any, limits: Any, dt: float, age: Any, out: Any) -> None:
     """Write the tips and goals of all legs, (step, start, leg, 2), and their stance, (step, start, leg), to `out`."""
     feet, goals, stands = state
     front, _, _ = lines
@@ -129,7 +166,7 @@ def _plan(state: Any, twists: Any, lines: Any, limits: Any, dt: float, done: int
                 f[leg, 0], f[leg, 1] = x + part * (g[leg, 0] - x), y + part * (g[leg, 1] - y)
                 s[leg] = way <= dt
             if moves:
-                _lift(f, g, s, twists[n, start], lines, limits, (done + n) % EVERY == 0)
+                _lift(f, g, s, twists[n, start], lines, limits, (age[start] + n) % EVERY == 0)
             all_feet[n, start], all_goals[n, start], all_stance[n, start] = f, g, s
 
 

@@ -1,53 +1,34 @@
-"""Real obstacles: what lies ahead is solid, is not felt before it is reached, and every start is counted once."""
+"""The ground: obstacles are solid and have no effect before they are reached; slopes and soft ground."""
 
-import json
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
-import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hexmj import LDVS, PRESETS, STICK_INSECT, Conditions, InputError, Stride, draw_starts, physical_walk
 from hexmj.bodies.ground import beyond_the_ground, ground_level
 from hexmj.bodies.mjcf import compile_body
-from hexmj.io import settings
-from hexmj.measures.physical import PhysicalWalk, physical_outcomes
+from hexmj.measures.physical import PhysicalWalk
 from hexmj.measures.tables import reach
 from hexmj.physics.settle import settle
-from hexmj.studies.terrain import Terrain
-from hexmj.sweep import run_study
 
 GROUNDS = {
     "flat": Conditions(),
     "step": Conditions(ground="step", ground_at=45.0),
     "gap": Conditions(ground="gap", ground_at=45.0, ground_length=5.0),
     "hurdle": Conditions(ground="hurdle", ground_at=45.0),
+    "stairs": Conditions(ground="stairs", ground_at=45.0, ground_height=2.0, ground_length=15.0),
     "rough": Conditions(ground="rough", ground_at=45.0, ground_height=4.0),
 }
-FEW: dict[str, Any] = {
-    "velocities": (0.6,), "grounds": ("step",), "heights": (4.0,), "grasps": (0.0,), "n_starts": 6,
-}  # fmt: skip
 
 
 @cache
 def walked(ground: str) -> PhysicalWalk:
     """A few starts that reach the obstacle when they have walked 7 mm, and cross it."""
     return physical_walk(draw_starts(3, seed=0), LDVS, 0.6, 150.0, conditions=GROUNDS[ground])
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
-    return tmp_path_factory.mktemp("walks")
-
-
-@pytest.fixture(scope="module")
-def few(folder) -> xr.Dataset:
-    return run_study(Terrain(LDVS, **FEW), folder)
 
 
 @pytest.mark.parametrize("ground", GROUNDS)
@@ -101,7 +82,7 @@ def test_feet_stand_on_top_as_on_the_plane(ground):
     assert_allclose(forces[1], forces[0], rtol=0.01)
 
 
-@pytest.mark.parametrize("ground", ["step", "gap", "hurdle", "rough"])
+@pytest.mark.parametrize("ground", ["step", "stairs", "gap", "hurdle", "rough"])
 def test_nothing_is_felt_before_it_is_reached(ground):
     """The same bits as on flat ground; a bank's box rounds other than a plane."""
     flat, ahead = walked("flat").qpos, walked(ground).qpos
@@ -113,52 +94,6 @@ def test_nothing_is_felt_before_it_is_reached(ground):
     else:
         assert_array_equal(ahead[far], flat[far])
     assert not np.array_equal(ahead, flat, equal_nan=True)
-
-
-def test_every_start_is_counted_once(few):
-    """Reached are those that did not fall before; of them some fall, some cross, the rest is held up."""
-    flat, step = few.isel(obstacle=0), few.isel(obstacle=1)
-    assert few.obstacle.values.tolist() == ["flat", "step 4 mm"]
-    assert_array_equal(step.reached, flat.reached)
-    begin = settings(few)["conditions"]["ground_at"] - reach(Stride())[0]
-    before = few.fall * few.velocity <= begin
-    assert_array_equal(few.reached + before.sum("start"), few.sizes["start"])
-    assert_array_equal(before.isel(obstacle=0), before.isel(obstacle=1))
-    assert_array_equal(flat.fall.where(before.isel(obstacle=0)), step.fall.where(before.isel(obstacle=1)))
-    assert_allclose(few.flss * few.reached, few.after.sum("start"))
-    assert (few.flss_low <= few.flss).all()
-    assert (few.flss <= few.flss_high).all()
-    assert (few.crossed + few.after.sum("start") <= few.reached).all()
-
-
-def test_a_cell_is_a_physical_walk_under_those_conditions(few):
-    conditions = Conditions(ground_at=80.0, ground="step", ground_height=4.0)
-    settled = settle(draw_starts(6, 0), conditions)
-    walks = physical_outcomes(settled, LDVS, 0.6, few.attrs["distance"] / 0.6, threads=1)
-    one = few.sel(obstacle="step 4 mm").squeeze()
-    for name in ("fall", "fall_part", "tilt", "speed"):
-        assert_array_equal(one[name], getattr(walks, name))
-
-
-@pytest.mark.slow
-def test_the_command_prints_what_it_measured(few, folder, tmp_path, run):
-    words = ["terrain", "--velocity", "0.6", "--grounds", "step", "--heights", "4", "--grasps", "0", "--starts", "6"]
-    (tmp_path / "walks").symlink_to(folder)
-    code, text, _ = run(*words, "--out", tmp_path, "--json")
-    assert code == 0
-    assert json.loads(text)["flss"] == few.flss.values.tolist()
-    assert "step 4 mm" in run(*words, "--out", tmp_path)[1]
-    with xr.open_dataset(tmp_path / "terrain.nc", engine="h5netcdf") as saved:
-        assert_array_equal(saved.fall, few.fall)
-    assert {"terrain.png", "manifest.json"} <= {file.name for file in tmp_path.iterdir()}
-
-
-def test_obstacles_have_their_names_and_sizes():
-    study = Terrain(LDVS, grounds=("gap", "hurdle"), heights=(2.0,), lengths=(5.0,), conditions=Conditions())
-    found = study.obstacles
-    assert list(found) == ["flat", "gap 5 mm", "hurdle 2 mm"]
-    assert found["gap 5 mm"] == Conditions(ground="gap", ground_length=5.0)
-    assert found["hurdle 2 mm"] == Conditions(ground="hurdle", ground_height=2.0)
 
 
 @pytest.mark.parametrize(("ground", "size"), [("step", {"ground_height": 2.0}), ("gap", {"ground_length": 1.0})])
@@ -180,6 +115,7 @@ def test_who_walks_off_the_ground_that_was_laid_has_not_fallen(ground, size):
             [(501.0, 201.0), (501.0, -201.0)],
         ),
         ("step", [(499.0, 300.0), (1499.0, 199.0)], [(501.0, 201.0), (1501.0, 0.0)]),
+        ("stairs", [(499.0, 300.0), (1499.0, 199.0)], [(501.0, 201.0), (1501.0, 0.0)]),
         ("gap", [(0.0, 199.0), (-999.0, 0.0), (1500.0, 0.0)], [(0.0, 201.0), (-1001.0, 0.0), (1511.0, 0.0)]),
     ],
 )
@@ -188,3 +124,21 @@ def test_the_ground_ends_where_its_pieces_do(ground, within, beyond):
     for places, ends in ((within, False), (beyond, True)):
         for x, y in places:
             assert beyond_the_ground(ahead, np.array([x, y, 0.0])) == ends, (x, y)
+
+
+@pytest.mark.parametrize(("axis", "pitch", "roll"), [(0, 0.3, 0.0), (0, -0.3, 0.0), (1, 0.0, 0.3)])
+def test_a_slope_tilts_gravity_and_moves_the_projected_centre_of_mass(axis, pitch, roll):
+    flat, steep = Conditions(), Conditions(pitch=pitch, roll=roll)
+    gravity = compile_body(steep).model.opt.gravity
+    assert_allclose(np.linalg.norm(gravity), np.linalg.norm(compile_body(flat).model.opt.gravity))
+    assert_allclose(gravity[axis] / gravity[2], np.tan(pitch + roll))
+    level, tilted = (physical_walk(draw_starts(1, 1), LDVS, 0.0, 1.0, conditions=case) for case in (flat, steep))
+    moved = (tilted.measured.feet - level.measured.feet)[-1, 0, :, axis].mean()
+    assert_allclose(moved, 10.0 * np.tan(pitch + roll), rtol=0.1)  # the standing height is 10 mm
+
+
+def test_the_insect_sinks_into_soft_ground():
+    heights = [
+        settle(draw_starts(2, 1), Conditions(softness=softness)).qpos[:, 2].mean() for softness in (0.0, 5.0, 10.0)
+    ]
+    assert heights[0] > heights[1] > heights[2]

@@ -1,43 +1,26 @@
-"""Disturbed walks: the plan that meets a disturbance, the strategies, the starts, and the frequencies."""
+"""Disturbed plans: halts, stopped legs, the strategies after them, and the starts that are stable until then."""
 
-import json
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from hexmj import (
-    HWS,
-    LDVS,
-    UNCOORDINATED,
-    Acceleration,
-    Conditions,
-    Cruse1998,
-    InputError,
-    SensoryFeedback,
-    Stride,
-    first_loss,
-    physical_walk,
-    walk,
-)
-from hexmj.controllers.cruse1998.weights import general
+from hexmj import LDVS, UNCOORDINATED, Acceleration, InputError, SensoryFeedback, Stride, first_loss, walk
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Sensed
 from hexmj.stability import stability_margin, walk_margin
-from hexmj.studies.disturbance import DisturbedWalks, with_flss_after
-from hexmj.studies.disturbed_plans import (
+from hexmj.tasks.disturbed import (
     PAUSE,
+    SETTLED,
     Disturbance,
     Disturbed,
     DisturbedPlan,
     Postures,
     collect_postures,
+    find_stable_starts,
     reorganise,
 )
-from hexmj.studies.disturbed_walks import SETTLED, Case, StableWalks, disturbance_of, find_stable_starts
-from hexmj.sweep import run_study
 from tiers import few_of
 
 STRIDE, V, GRID = Stride(), 0.5, 20
@@ -52,15 +35,26 @@ def postures() -> Postures:
     return collect_postures(LDVS, V, 0, STRIDE)
 
 
-def disturbance(kind) -> Disturbance:
-    return disturbance_of(STABLE, kind, LDVS, V, STRIDE)
+def disturbance(kind, leg=None) -> Disturbance:
+    return Disturbance(kind, STABLE.step, STABLE.draw, leg)
 
 
-def plan(kind, postures=None, acceleration=None, threads=None) -> DisturbedPlan:
-    disturbed = Disturbed(LDVS, disturbance(kind), postures, slows=acceleration is not None)
+def begin_with(disturbance, postures=None, acceleration=None, threads=None) -> DisturbedPlan:
+    disturbed = Disturbed(LDVS, disturbance, postures, slows=acceleration is not None)
     plan = begin(disturbed, STABLE.starts, V, STRIDE, acceleration, threads)
     assert isinstance(plan, DisturbedPlan)
     return plan
+
+
+def plan(kind, *how, **more) -> DisturbedPlan:
+    return begin_with(disturbance(kind), *how, **more)
+
+
+def disturbed_at(kind) -> np.ndarray:
+    """Return the step before which each start is disturbed, (start,)."""
+    disturbed = plan(kind)
+    disturbed.advance(STEPS)
+    return disturbed.step
 
 
 def sensing(postures=None, acceleration=None, kind="halt") -> Any:
@@ -79,30 +73,6 @@ def same(one, other):
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("velocity", "x", "stance"))
 
 
-@pytest.mark.slow
-def test_the_leg_that_is_stopped_is_one_that_protracts_as_the_legs_are_told():
-    """Where none does, the next one that does."""
-    stopped = Disturbance("leg", np.array([4, 4, 4]), np.array([1, 4, 5]))
-    up = ~np.eye(6, dtype=bool)[[3, 4, 2]]
-    tips, standing = stopped.legs(np.zeros((3, 6)), up)
-    assert standing.all() and not tips.any()
-    up[1] = True
-    assert stopped.awaited(up).tolist() == [False, True, False]
-    assert not replace(stopped, kind="halt").awaited(up).any()
-    least = Disturbance("leg", np.array([300, 310, 320, 330, 340, 350]), np.array([0, 1, 2, 3, 4, 5]))
-    free, *walks = (
-        physical_walk(STABLE.starts, SensoryFeedback(one), V, (least.step.max() + 200) * STRIDE.dt)
-        for one in (LDVS, Disturbed(LDVS, least), Disturbed(LDVS, replace(least, leg=(least.leg + 3) % 6)))
-    )
-    goes_on = np.flatnonzero(free.outcomes.fall > (least.step + 200) * STRIDE.dt)
-    assert len(goes_on) > 3
-    for stance in (one.ordered.stance for one in walks):
-        for start in goes_on:
-            first = np.flatnonzero((stance[:, start] != free.ordered.stance[:, start]).any(axis=1))[0] + 1
-            assert least.step[start] < first < least.step[start] + 200
-            assert stance[first - 1, start].sum() > free.ordered.stance[first - 1, start].sum()
-
-
 def test_a_push_does_not_change_the_plan():
     assert same(plan("push").advance(STEPS), walk(STABLE.starts, LDVS, V, STEPS * STRIDE.dt))
 
@@ -110,7 +80,7 @@ def test_a_push_does_not_change_the_plan():
 @pytest.mark.parametrize("kind", ["halt", "leg"])
 def test_until_its_disturbance_a_walk_is_undisturbed(kind):
     whole, free = plan(kind).advance(STEPS), walk(STABLE.starts, LDVS, V, STEPS * STRIDE.dt)
-    for start, step in enumerate(disturbance(kind).step):
+    for start, step in enumerate(disturbed_at(kind)):
         assert np.array_equal(whole.x[:step, start], free.x[:step, start])
         assert not np.array_equal(whole.x[step : step + 100, start], free.x[step : step + 100, start])
 
@@ -128,15 +98,17 @@ def test_a_halt_is_a_new_start_from_where_the_legs_are():
         assert np.array_equal(whole.stance[after, start], again.stance[:, start])
 
 
-def test_a_stopped_leg_retracts_and_the_others_go_on():
-    stopped, free = disturbance("leg"), walk(STABLE.starts, LDVS, V, STEPS * STRIDE.dt)
-    whole = plan("leg").advance(STEPS)
-    for start, (step, leg) in enumerate(zip(stopped.step, stopped.leg, strict=True)):
-        assert not free.stance[step - 1, start, leg]
-        assert free.stance[STABLE.step[start] - 1 : step - 1, start].all()  # the first moment at which one protracts
-        assert whole.x[step, start, leg] == whole.x[step - 1, start, leg] - V * STRIDE.dt
-        others = np.arange(6) != leg
-        assert np.array_equal(whole.x[step, start, others], free.x[step, start, others])
+@pytest.mark.parametrize("leg", [None, 4])
+def test_one_swinging_leg_is_stopped_and_the_others_continue(leg):
+    free, stopped = walk(STABLE.starts, LDVS, V, STEPS * STRIDE.dt), begin_with(disturbance("leg", leg))
+    whole = stopped.advance(STEPS)
+    for start, step in enumerate(stopped.step):
+        changed = whole.x[step, start] != free.x[step, start]
+        (index,) = np.flatnonzero(changed)
+        assert leg in (None, index) and not free.stance[step - 1, start, index]
+        waited = free.stance[STABLE.step[start] - 1 : step - 1, start]
+        assert (waited if leg is None else waited[:, leg]).all()
+        assert whole.x[step, start, index] == whole.x[step - 1, start, index] - V * STRIDE.dt
 
 
 @pytest.mark.parametrize("kind", ["halt", "leg", "push"])
@@ -245,57 +217,6 @@ def test_starts_are_stable_until_disturbed_and_do_not_depend_on_their_number():
         assert np.array_equal(getattr(more, name)[:6], getattr(STABLE, name))
 
 
-def test_only_losses_after_the_disturbance_and_within_the_window_count():
-    #              before, short, between, whole's end, later, never
-    lost = [[5.0, 20.0, 31.0, 45.0, 45.1, np.inf], [np.inf, np.inf, np.inf, 12.0, np.inf, np.inf]]
-    table = xr.Dataset(
-        {
-            "time": (("velocity", "case", "start"), np.full((1, 2, 6), 10.0)),
-            "back": (("velocity", "case", "start"), np.full((1, 2, 6), 25.0)),
-            "planned_loss": (("velocity", "case", "start"), [lost]),
-        },
-        coords={
-            "duration": ("velocity", [20.0]),
-            "disturbance": ("case", ["halt", "halt"]),
-            "strategy": ("case", ["none", "slow_down"]),
-        },
-    )
-    result = with_flss_after(table).isel(velocity=0)
-    assert result.kinematic_reached.values.tolist() == [5, 6]
-    np.testing.assert_allclose(result.kinematic.sel(observation_time="short"), [1 / 5, 1 / 6])
-    np.testing.assert_allclose(result.kinematic.sel(observation_time="whole"), [3 / 5, 1 / 6])
-    np.testing.assert_allclose(result.kinematic_buys.sel(observation_time="whole")[1], 2 / 5)
-    assert (result.kinematic_low <= result.kinematic).all() and (result.kinematic <= result.kinematic_high).all()
-
-
-FEW: dict[str, Any] = {"velocities": [V], "n_starts": 4, "observation_time": 30.0}
-
-
-@pytest.mark.slow
-def test_a_hard_push_fells_and_finished_walks_are_kept(tmp_path):
-    pushed: dict[str, Any] = FEW | {"disturbances": ["push"], "strategies": [], "observation_time": 45.0}
-    study = DisturbedWalks(LDVS, impulses=[60.0], **pushed)
-    result = run_study(study, tmp_path, threads=1)
-    assert result.physical_reached.values.tolist() == [[4, 4]]
-    assert result.physical.sel(observation_time="whole").values.tolist() == [[0.0, 0.25]]
-    assert (result.planned_loss.isel(case=0) == result.planned_loss.isel(case=1)).all()
-    files = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    assert len(files) == 2
-    assert run_study(study, tmp_path, threads=2).identical(result)
-    assert files == {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
-    other = run_study(DisturbedWalks(LDVS, impulses=[50.0, 60.0], **pushed), threads=2)
-    assert other.fall[0, 2].equals(result.fall[0, 1])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["halt", "leg", "push"])
-def test_some_starts_alone_go_as_among_all(kind):
-    walks = StableWalks(LDVS, V, 3, 0, STRIDE)
-    asked = Case(kind, "none", 5.0 * (kind == "push")), 5.0, None, Conditions()
-    every, alone = walks.times(*asked), walks.times(*asked, which=np.array([2, 0]))
-    assert alone.identical(every.isel(start=[2, 0]))
-
-
 @dataclass(frozen=True)
 class Lifts:
     """LDVS, which lifts its feet itself, and steps beside its lines."""
@@ -329,51 +250,8 @@ def test_a_halted_start_puts_its_feet_down_where_they_are():
         assert not np.isnan(walk.height[step + PAUSED :, start]).any()
 
 
-@dataclass(frozen=True)
-class Stands(Lifts):
-    """On all its feet."""
-
-    name: str = "stands"
-
-    def begin_at_speed(self, *given: Any, **how: Any) -> Any:
-        plan: Any = LDVS.begin_at_speed(*given, **how)
-        goes_on = plan.advance
-        plan.advance = lambda steps: replace(goes_on(steps), stance=np.ones((steps, *plan.starts.shape), dtype=bool))
-        return plan
-
-
-def test_no_leg_is_stopped_of_a_controller_that_lifts_none():
-    with pytest.raises(InputError, match="leg"):
-        disturbance_of(STABLE, "leg", Stands(), V, STRIDE)
-
-
-def test_any_weights_can_be_disturbed():
-    """General weights have no hash."""
-    controller = Cruse1998(general(HWS.weights))
-    study = DisturbedWalks(controller, disturbances=["halt"], strategies=["reorganise"], kinematic=True, **FEW)
-    assert np.isfinite(run_study(study).kinematic.sel(observation_time="whole")).all()
-
-
-def test_without_physics_pushes_and_grasping_are_left_out():
-    few: Any = {"disturbances": ["halt", "push"], "strategies": ["reorganise", "grasp"], "kinematic": True}
-    cases = DisturbedWalks(LDVS, **FEW, **few).cases
-    assert [(case.disturbance, case.strategy) for case in cases] == [
-        ("undisturbed", "none"), ("halt", "none"), ("halt", "reorganise"),
-    ]  # fmt: skip
-
-
 def test_walks_that_cannot_be_disturbed_are_errors():
     with pytest.raises(InputError):
         collect_postures(UNCOORDINATED, 0.9, 0, STRIDE)
     with pytest.raises(InputError):
         find_stable_starts(UNCOORDINATED, 0.9, 50_000, 0, STRIDE, GRID)
-
-
-@pytest.mark.slow
-def test_the_command_writes_its_files(tmp_path, run):
-    words = ["disturb", "--kinematic", "--velocity", 0.5, "--starts", 20, "--out", tmp_path / "out"]
-    code, text, _ = run(*words, "--strategies", "slow_down", "--json")
-    assert code == 0
-    assert json.loads(text)["strategy"] == ["none", "none", "slow_down", "none", "slow_down"]
-    names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"disturb.nc", "disturb.png", "manifest.json", "walks"}

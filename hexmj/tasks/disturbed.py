@@ -1,5 +1,6 @@
 """Plans with a disturbance (paper, Section 6), and the reorganisation of legs, the paper's first strategy.
 
+The paper describes an obstacle as "the termination of motion. Then the motion is initiated from new leg positions".
 Reorganisation moves the legs to the nearest of a few postures of undisturbed walking. The legs also continue with the
 states, swing or stance, of that posture, since tip positions alone do not keep the walk stable.
 """
@@ -9,27 +10,26 @@ from typing import Literal, cast
 
 import numpy as np
 
+from hexmj.command import Command
 from hexmj.controllers.planning import begin
-from hexmj.controllers.protocol import (
-    Controller,
-    FeedbackPlan,
-    Sensed,
-    SteerableController,
-    SteerablePlan,
-)
+from hexmj.controllers.protocol import Controller, FeedbackPlan, Sensed, SteerableController, SteerablePlan
 from hexmj.controllers.wrappers import WrappedPlan
 from hexmj.errors import InputError
 from hexmj.gaits import steady_state_gait
+from hexmj.measures.kinematic import first_loss
 from hexmj.stability import stability_margin, walk_margin
 from hexmj.starts import draw_starts
 from hexmj.timing import Stride
 from hexmj.walks import PlannedWalk, copied, joined
 
-Kind = Literal["halt", "leg", "push"]
-"""Disturbance: all legs halt, one swinging leg is stopped, or the body is pushed, which does not change the plan."""
-
 NEVER = 2**62
 """Step number that stands for an event that has not happened yet."""
+
+SETTLED = 3
+"""Number of periods of a single leg before the period in which the disturbance occurs."""
+
+MOST_DRAWN = 200_000
+"""Maximum number of starts drawn to find starts whose plan is stable until the disturbance."""
 
 POSTURES = 36
 """Number of postures collected over one period; unstable postures are then dropped."""
@@ -41,29 +41,94 @@ PAUSE = 4.0
 """Time for which a halted body stands [time units]. Up to V_p = 200 mm/s it exceeds the 20 ms of lowering a foot."""
 
 
+class TooFewStable(InputError):
+    """Raised if too few random starts keep static stability until the disturbance."""
+
+
+@dataclass(frozen=True, eq=False)
+class StableStarts:
+    """Random starts whose plan keeps static stability until the disturbance."""
+
+    starts: np.ndarray
+    """(start, leg) tips at time 0 [mm]."""
+    step: np.ndarray
+    """(start,) number of steps before the disturbance."""
+    draw: np.ndarray
+    """(start,) random number in [0, 1) that chooses which of the protracting legs is stopped."""
+    drawn: int
+    """Number of random starts drawn until enough stable starts were found."""
+
+
+def find_stable_starts(
+    controller: Controller,
+    velocity: float,
+    n_starts: int,
+    seed: int,
+    stride: Stride,
+    grid: int,
+    command: Command | None = None,
+) -> StableStarts:
+    """Return the first `n_starts` random starts of a seed whose plan is stable until the disturbance.
+
+    The disturbance occurs at a random multiple of `grid` steps, uniform within the period of a single leg that follows
+    the first `SETTLED` periods.
+
+    Args:
+        controller: controller that plans the walks.
+        velocity: V_r of the walks, which gives the period of a leg.
+        n_starts: number of starts.
+        seed: seed of the starts and of the times.
+        stride: step range, lines of the tips and time step.
+        grid: number of steps, see above.
+        command: command of the walks; by default they are straight at `velocity`.
+
+    Raises:
+        TooFewStable: fewer than `n_starts` of `MOST_DRAWN` starts are stable until the disturbance.
+    """
+    period, drawn, walks = stride.periods(velocity) / stride.dt, 0, command or velocity
+    while drawn < MOST_DRAWN >= n_starts:
+        drawn = min(max(2 * drawn, n_starts), MOST_DRAWN)
+        starts = draw_starts(drawn, seed, stride)
+        when, draw = np.random.default_rng([seed, 2]).uniform(size=(drawn, 2)).T
+        step = grid * np.ceil((SETTLED + when) * period / grid).astype(int)
+        found = np.flatnonzero(np.isinf(first_loss(starts, controller, walks, step * stride.dt, stride=stride)))
+        if len(found) >= n_starts:
+            found = found[:n_starts]
+            return StableStarts(starts[found], step[found], draw[found], int(found[-1]) + 1)
+    raise TooFewStable(
+        f"fewer than n_starts = {n_starts} of {MOST_DRAWN} starts are stable until the disturbance at V = {velocity:g}"
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Disturbance:
     """One disturbance of the same kind in the walk of every start."""
 
-    kind: Kind
+    kind: Literal["halt", "leg", "push"]
+    """All legs halt; one swinging leg is stopped, so that its stance begins where it is; or a push on the body, which
+    leaves the legs as they are."""
     step: np.ndarray
-    """(start,) number of steps of the plan before the disturbance."""
-    leg: np.ndarray
-    """(start,) index of the leg that kind 'leg' stops; if it stands, the next swinging leg in order is stopped."""
+    """(start,) number of steps of the plan before the disturbance; kind 'leg' then waits until a leg swings."""
+    draw: np.ndarray
+    """(start,) random number in [0, 1) that chooses which of the swinging legs is stopped."""
+    leg: int | None = None
+    """Index of the leg that is stopped; None for a random one."""
+
+    def swinging(self, standing: np.ndarray) -> np.ndarray:
+        """Return the legs that can be stopped, (start, leg), given which legs stand, (start, leg)."""
+        return ~standing if self.leg is None else ~standing & (np.arange(6) == self.leg)
 
     def awaited(self, standing: np.ndarray) -> np.ndarray:
         """Return whether each start must wait for a swinging leg, (start,), given which legs stand, (start, leg)."""
-        return (self.kind == "leg") & np.all(standing, axis=1)
+        return np.logical_and(self.kind == "leg", ~self.swinging(standing).any(axis=1))
 
-    def legs(self, tips: np.ndarray, standing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return tips [mm] and whether legs stand, both (start, leg), after a disturbance at this moment."""
-        if self.kind == "halt":
-            return tips, np.ones_like(standing)
-        if self.kind == "leg":
-            inorder = (self.leg[:, None] + np.arange(6)) % 6
-            first = np.argmin(np.take_along_axis(standing, inorder, axis=1), axis=1)
-            return tips, standing | (np.arange(6) == (self.leg + first)[:, None] % 6)
-        return tips, standing
+    def stands_after(self, standing: np.ndarray) -> np.ndarray:
+        """Return which legs stand after a disturbance at this moment, (start, leg)."""
+        if self.kind != "leg":
+            return np.logical_or(standing, self.kind == "halt")
+        legs = self.swinging(standing)
+        nth = np.floor(self.draw * legs.sum(axis=1)).astype(int)
+        return standing | (legs & (np.cumsum(legs, axis=1) == nth[:, None] + 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +198,7 @@ class Disturbed:
 
     Without a strategy, a halted body stands for `PAUSE` and then restarts from its tips; other walks continue at once.
     With `postures`, the body also halts, moves its legs to a posture, and continues with its tips and leg states. With
-    `slows`, the walk continues at V_r(0) and accelerates to V_r by Eq. 11. With sensory feedback, kind 'leg' stops a
-    leg that swings in the simulation; if all legs stand, the plan waits for a swing.
+    `slows`, the walk continues at V_r(0) and accelerates to V_r by Eq. 11.
     """
 
     controller: SteerableController
@@ -165,7 +229,8 @@ class DisturbedPlan(WrappedPlan):
         """Wrap a plan that is at time 0."""
         super().__init__(plan)
         self._disturbance, self._postures, self._slows = controller.disturbance, controller.postures, controller.slows
-        self._step, self._sensed = self._disturbance.step.copy(), False
+        self.step = self._disturbance.step.copy()
+        """(start,) number of steps before the disturbance; it grows while a start waits for a swinging leg."""
         self.restart, self.slow_down = plan.restart, plan.slow_down
         self._stops = self._disturbance.kind == "halt" or self._postures is not None
         self._rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # start -> tips and leg states of its rest
@@ -179,19 +244,18 @@ class DisturbedPlan(WrappedPlan):
         """Return the next steps; two calls give the same steps as one call with the sum of their steps."""
         end, parts = self.done + steps, []
         while self.done < end:
-            now = self._step == self.done
-            awaited = now & self._sensed & self._disturbance.awaited(self._plan.standing)
-            self._step[awaited] += 1
+            now = self.step == self.done
+            awaited = now & self._disturbance.awaited(self._plan.standing)
+            self.step[awaited] += 1
             self._disturb(now & ~awaited)
             self._resume(self.resumed == self.done)
-            coming = np.concatenate([self._step, self.resumed, [end]])
+            coming = np.concatenate([self.step, self.resumed, [end]])
             parts.append(self._go_on(int(coming[coming > self.done].min()) - self.done))
         return joined(parts)
 
     def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
         """Continue from tips [mm] and leg states, both (start, leg); starts that rest after a halt ignore them."""
         self._plan.see(tips, standing)
-        self._sensed = True
 
     @property
     def tips(self) -> np.ndarray:
@@ -205,7 +269,7 @@ class DisturbedPlan(WrappedPlan):
 
     def _disturb(self, which: np.ndarray) -> None:
         """Disturb starts, mask (start,): set how long each rests, and the tips and states with which it continues."""
-        tips, standing = self._disturbance.legs(self._plan.tips, self._plan.standing)
+        tips, standing = self._plan.tips, self._disturbance.stands_after(self._plan.standing)
         self._tips[which], self._standing[which], self._held[which] = tips[which], standing[which], self._beside[which]
         self.resumed[which] = self.done
         steps = round(PAUSE / self.stride.dt)
@@ -237,7 +301,7 @@ class DisturbedPlan(WrappedPlan):
         self.done, self._beside = self.done + steps, walk.y[-1].copy()
         for start, (way, stands) in self._rests.items():
             if before < self.resumed[start]:
-                rows = slice(before - self._step[start], before - self._step[start] + steps)
+                rows = slice(before - self.step[start], before - self.step[start] + steps)
                 walk.velocity[:, start] = 0.0
                 walk.x[:, start], walk.stance[:, start] = way[rows], stands[rows]
                 walk.y[:, start], walk.height[:, start] = self._held[start], np.nan
@@ -251,5 +315,4 @@ class DisturbedFeedbackPlan(DisturbedPlan):
 
     def sense(self, sensed: Sensed) -> None:
         """Pass the sensed tips and contacts to the inner plan."""
-        self._sensed = True
         self._plan.sense(sensed)
