@@ -15,6 +15,7 @@ import numpy as np
 
 from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.baselines.evolved import EVOLVED, FOUND
+from hexmj.controllers.baselines.replanning import Replanning
 from hexmj.controllers.cruse1998 import LDVS, OWN_TABLES, PRESETS, TripodLifted, read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
 from hexmj.errors import InputError
@@ -28,8 +29,10 @@ NAMED: dict[str, Controller] = {
     **PRESETS,
     **BASELINES,
     "ldvs-tripod": TripodLifted(LDVS.weights, name="ldvs-tripod"),
+    "ldvs-replans": Replanning(LDVS),
 }
-"""Name -> controller of this package: the presets, the baselines, and LDVS with one tripod lifted at time 0."""
+"""Name -> controller of this package: the presets, the baselines, LDVS with one tripod lifted at time 0,
+and LDVS that changes to a gait on five legs when the loss of a leg is announced."""
 
 VARIED = re.compile(r"(?P<name>.+?)(?P<parts>(-(without|with)-\d)+)")
 """Pattern of a controller's name that switches mechanisms or rules off or on, such as ldvs-without-3."""

@@ -47,13 +47,16 @@ class Legs:
 class LiftedPlan(StepwisePlan):
     """A `protocol.SteerablePlan` whose legs a rule lifts; also a `protocol.FeedbackPlan` if the rule uses the load."""
 
-    def __init__(self, rule: "Lifted", starts, velocity, stride, acceleration, age=0) -> None:
-        """Begin at time 0, see `protocol.Controller.begin`, with an acceleration that began `age` steps before."""
+    def __init__(self, rule: "Lifted", starts, velocity, stride, acceleration, age=0, stands=None) -> None:
+        """Begin at time 0, see `protocol.Controller.begin`, with an acceleration that began `age` steps before.
+
+        By default all legs stand; `stands`, (start, leg), are those that do.
+        """
         x = checked_starts(starts, stride)
         v = checked_velocities(velocity, len(x), acceleration)
         super().__init__(self._step, x, v, stride, acceleration, np.full(len(x), age))
         self._rule, self._felt = rule, np.full(x.shape, np.nan)
-        self._legs = self._at_rest(x)
+        self._legs = self._at_rest(x) if stands is None else replace(self._at_rest(x), stands=stands)
         self._state: Any = rule.at_start(self._legs)
         if rule.reads_load:
             self.sense = self._feel
