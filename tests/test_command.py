@@ -29,7 +29,7 @@ COMMANDS = {
     "slalom": Command(0.25, 0.0, (0.003, -0.003, 0.003), (0.0, PERIOD, 2 * PERIOD)),
     "stop and go": Command((0.3, 0.0, 0.3), times=(0.0, PERIOD, 1.5 * PERIOD)),
 }
-LEAGUE = entrants((*EVERYONE, "free"))
+LEAGUE = entrants(EVERYONE)
 
 
 def planned(command, controller: Any = hexmj.LDVS, starts=STARTS, steps=1200):

@@ -5,11 +5,8 @@ from typing import Any
 import pytest
 
 import hexmj
-from hexmj.command import Command
 from hexmj.controllers.baselines.free_gait import FreeGait
 from hexmj.controllers.conformance import check_controller
-from hexmj.controllers.planning import advanced
-from hexmj.controllers.steered import begin
 from hexmj.errors import InputError
 
 STRIDE, STARTS, FREE = hexmj.Stride(), hexmj.draw_starts(100, 67), FreeGait()
@@ -26,15 +23,8 @@ def test_slow_walks_keep_their_stability_margin(v):
     assert lifted.any(axis=0).all() and hexmj.walk_margin(walk)[lifted].min() >= FREE.margin - 0.1
 
 
-@pytest.mark.parametrize("command", [Command(0.25, 0.0, 0.003), Command(-0.2), Command(0.0, 0.0, 0.006)])
-def test_it_plans_curves_itself(command):
-    walk = advanced(begin(FREE, STARTS, command, STRIDE), 2000)
-    assert (hexmj.walk_margin(walk)[1000:] > 0.0).all()
-
-
 def test_legs_step_at_least_the_least_step_unless_they_reach_their_end():
-    plan = begin(FREE, STARTS, 0.3, STRIDE)
-    walk = advanced(plan, 2000)
+    walk = hexmj.walk(STARTS, FREE, 0.3, 200.0)
     lifted = walk.stance[:-1] & ~walk.stance[1:]
     x = walk.x[1:][lifted]
     assert ((x <= STRIDE.aep0 - FREE.least_step + 1e-9) | (x <= STRIDE.pep_min)).all() and len(x) > 100
