@@ -73,6 +73,32 @@ class WrappedPlan:
         return walk
 
 
+class WrappedSteerablePlan(WrappedPlan):
+    """Base class of `protocol.SteerablePlan`s that wrap one."""
+
+    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        self._plan.see(tips, standing)
+
+    def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        self._plan.restart(which, tips)
+
+    def slow_down(self, which: np.ndarray) -> None:
+        """See `protocol.SteerablePlan`."""
+        self._plan.slow_down(which)
+
+    @property
+    def tips(self) -> np.ndarray:
+        """See `protocol.SteerablePlan`."""
+        return self._plan.tips
+
+    @property
+    def standing(self) -> np.ndarray:
+        """See `protocol.SteerablePlan`."""
+        return self._plan.standing
+
+
 @dataclass(frozen=True)
 class FromSteadyState(Wrapper):
     """A controller whose walks begin after a warm-up in the plan. In physics, all feet stand on the tips at its end.

@@ -13,7 +13,7 @@ import numpy as np
 from hexmj.command import Command
 from hexmj.controllers.planning import begin
 from hexmj.controllers.protocol import Controller, FeedbackPlan, Sensed, SteerableController, SteerablePlan
-from hexmj.controllers.wrappers import WrappedPlan
+from hexmj.controllers.wrappers import WrappedSteerablePlan
 from hexmj.errors import InputError
 from hexmj.gaits import steady_state_gait
 from hexmj.measures.kinematic import first_loss
@@ -222,7 +222,7 @@ class Disturbed:
         return DisturbedFeedbackPlan(self, plan) if isinstance(plan, FeedbackPlan) else DisturbedPlan(self, plan)
 
 
-class DisturbedPlan(WrappedPlan):
+class DisturbedPlan(WrappedSteerablePlan):
     """The plan that a `Disturbed` controller begins: a `protocol.SteerablePlan` with a disturbance."""
 
     def __init__(self, controller: Disturbed, plan: SteerablePlan) -> None:
@@ -231,7 +231,6 @@ class DisturbedPlan(WrappedPlan):
         self._disturbance, self._postures, self._slows = controller.disturbance, controller.postures, controller.slows
         self.step = self._disturbance.step.copy()
         """(start,) number of steps before the disturbance; it grows while a start waits for a swinging leg."""
-        self.restart, self.slow_down = plan.restart, plan.slow_down
         self._stops = self._disturbance.kind == "halt" or self._postures is not None
         self._rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # start -> tips and leg states of its rest
         self._tips, self._standing = np.array(self.starts), np.ones(self.starts.shape, dtype=bool)
@@ -252,20 +251,6 @@ class DisturbedPlan(WrappedPlan):
             coming = np.concatenate([self.step, self.resumed, [end]])
             parts.append(self._go_on(int(coming[coming > self.done].min()) - self.done))
         return joined(parts)
-
-    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
-        """Continue from tips [mm] and leg states, both (start, leg); starts that rest after a halt ignore them."""
-        self._plan.see(tips, standing)
-
-    @property
-    def tips(self) -> np.ndarray:
-        """Tips of the inner plan, (start, leg) [mm]."""
-        return self._plan.tips
-
-    @property
-    def standing(self) -> np.ndarray:
-        """Whether each leg stands in the inner plan, (start, leg)."""
-        return self._plan.standing
 
     def _disturb(self, which: np.ndarray) -> None:
         """Disturb starts, mask (start,): set how long each rests, and the tips and states with which it continues."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from hexmj.controllers.baselines.lifted import Legs, Lifted, LiftedPlan
 from hexmj.controllers.protocol import check_steerable
-from hexmj.controllers.wrappers import WrappedPlan, Wrapper
+from hexmj.controllers.wrappers import WrappedSteerablePlan, Wrapper
 from hexmj.stability import margins, walk_margin
 from hexmj.timing import AT_SPEED, Acceleration, Stride
 from hexmj.validate import number, whole
@@ -145,7 +145,7 @@ class Replanning(Wrapper):
         return ReplannedPlan(plan, FiveLegs(self.lost), self.lost_at, velocity, acceleration, age)
 
 
-class ReplannedPlan(WrappedPlan):
+class ReplannedPlan(WrappedSteerablePlan):
     """A `protocol.SteerablePlan` that another plan continues from a time on."""
 
     def __init__(
@@ -182,28 +182,6 @@ class ReplannedPlan(WrappedPlan):
         self.done += steps
         time = np.arange(self.done - steps + 1, self.done + 1) * self.stride.dt
         return replace(joined(parts), time=time)
-
-    def see(self, tips: np.ndarray, standing: np.ndarray) -> None:
-        """See `protocol.SteerablePlan`."""
-        self._plan.see(tips, standing)
-
-    def restart(self, which: np.ndarray, tips: np.ndarray) -> None:
-        """See `protocol.SteerablePlan`."""
-        self._plan.restart(which, tips)
-
-    def slow_down(self, which: np.ndarray) -> None:
-        """See `protocol.SteerablePlan`."""
-        self._plan.slow_down(which)
-
-    @property
-    def tips(self) -> np.ndarray:
-        """See `protocol.SteerablePlan`."""
-        return self._plan.tips
-
-    @property
-    def standing(self) -> np.ndarray:
-        """See `protocol.SteerablePlan`."""
-        return self._plan.standing
 
 
 @lru_cache(maxsize=16)
