@@ -1,6 +1,6 @@
 """Figures of results, and the styles and axes that they share. Figures are made without pyplot."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from io import BytesIO
@@ -53,9 +53,6 @@ SERIES: tuple[dict[str, Any], ...] = (
 
 VELOCITY = "velocity $V_r / V_p$"
 """Label of a velocity axis."""
-
-FEWER, NOTHING = "\N{BULLET}", "\N{EN DASH}"
-"""Marks in a heat map: `FEWER` in a cell with missing walks, `NOTHING` in a cell without a value."""
 
 LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9}
 """Default options of legends."""
@@ -152,28 +149,3 @@ def interval(data: "xr.Dataset", name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the frequency `name`, (n,), and the lengths of its error bars below and above, (2, n)."""
     low, middle, high = (data[name + end].values for end in ("_low", "", "_high"))
     return middle, np.stack([middle - low, high - middle])
-
-
-def heat_map(axes: "Axes", columns: Sequence[str], values: np.ndarray, texts: np.ndarray, **scale: Any) -> None:
-    """Draw a heat map without a frame, with a text in every cell.
-
-    Args:
-        axes: axes to draw in.
-        columns: labels of the columns, drawn above them.
-        values: numbers shown as colours, (row, column); NaN has no colour.
-        texts: texts of the cells, (row, column), a first line in bold if there are two; an empty text is not drawn.
-        scale: options of `Axes.imshow`.
-    """
-    image = axes.imshow(values, aspect="auto", **scale)
-    shade = image.to_rgba(values)[..., :3] @ [0.3, 0.59, 0.11]
-    for row, column in np.argwhere(texts != ""):
-        colour = "white" if shade[row, column] < 0.5 and np.isfinite(values[row, column]) else "0.1"
-        text, _, small = str(texts[row, column]).partition("\n")
-        style: Any = {"color": colour, "ha": "center", "va": "center", "fontsize": 9}
-        axes.text(column, row - 0.22 * bool(small), text, fontweight="bold" if small else "normal", **style)
-        if small:
-            axes.text(column, row + 0.22, small, **style)
-    axes.tick_params(which="both", length=0)
-    axes.spines[:].set_visible(False)
-    axes.xaxis.tick_top()
-    axes.set_xticks(range(len(columns)), columns, fontsize=9, rotation=40, ha="left")

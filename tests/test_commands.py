@@ -21,7 +21,7 @@ from film_reader import read_film
 from hexmj.cli.command import StudyCommand, imported
 from hexmj.cli.main import COMMANDS, command
 from hexmj.cli.options import NAMES
-from hexmj.cli.output import difference, four_digits, interval, table
+from hexmj.cli.output import four_digits, interval, table
 from hexmj.controllers.cruse1998 import network_toml
 
 STUDIES = [name for name in COMMANDS if isinstance(command(name), StudyCommand)]
@@ -325,12 +325,10 @@ def test_output_may_be_cut_off(tmp_path):
 # ---- tables ----
 
 
-def test_unknown_frequencies_are_dashes_and_differences_have_signs() -> None:
+def test_unknown_frequencies_are_dashes() -> None:
     known = {"flss": 0.5, "flss_low": 0.25, "flss_high": 0.75}
     assert interval(xr.Dataset(known), "flss") == "0.500 (.25-.75)"
     assert interval(xr.Dataset(dict.fromkeys(known, np.nan)), "flss") == "-"
-    assert difference(xr.Dataset(dict.fromkeys(known, np.nan)), "flss") == "-"
-    assert difference(xr.Dataset({"lost": -0.5, "lost_low": -0.79, "lost_high": 0.04}), "lost") == "-.50 (-.79 to +.04)"
 
 
 @pytest.mark.parametrize(

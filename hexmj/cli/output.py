@@ -99,12 +99,6 @@ def interval(data: "xr.Dataset", measure: str) -> str:
     return "-" if middle != middle else f"{middle:.3f} ({text})"
 
 
-def difference(data: "xr.Dataset", measure: str) -> str:
-    """Return a difference of frequencies with its interval, such as +.12 (+.02 to +.22)."""
-    middle, low, high = (data[measure + end].item() for end in ("", "_low", "_high"))
-    return "-" if middle != middle else f"{middle:+.2f} ({low:+.2f} to {high:+.2f})".replace("0.", ".")
-
-
 def four_digits(value: float) -> str:
     """Return a number with four significant digits; a number of 1000 or more is rounded to a whole number."""
     return f"{value:.0f}" if value >= 1000 else f"{value:.4g}"

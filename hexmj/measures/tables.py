@@ -10,7 +10,7 @@ from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
 from hexmj.starts import SAMPLE, checked_list, draw_starts
-from hexmj.stats import paired_difference, wilson_intervals
+from hexmj.stats import wilson_intervals
 from hexmj.timing import Acceleration, Stride, check_reached, observation_duration, steps_within
 
 if TYPE_CHECKING:
@@ -172,18 +172,6 @@ def frequencies(name: str, events: np.ndarray, dims: Dims) -> dict[str, Any]:
     """Return the variables of `frequency`, and `name_starts`, the number of starts without NaN."""
     starts = np.isfinite(events).sum(axis=-1)
     return frequency(name, events, dims) | {f"{name}_starts": (dims, starts, {"units": "1"})}
-
-
-def differences(name: str, events: np.ndarray, others: np.ndarray, dims: Dims) -> dict[str, Any]:
-    """Return the frequency of `events` minus that of `others` on the same starts, with its 95 % interval.
-
-    Args:
-        name: name of the difference; the ends of its interval are `name_low` and `name_high`.
-        events: 1 for starts with the event and 0 without, (..., start); starts with NaN are left out.
-        others: the same for the events to compare with; broadcast to the shape of `events`.
-        dims: names of the axes before `start`.
-    """
-    return columns(name, dims, *paired_difference(events, np.broadcast_to(others, events.shape)))
 
 
 def columns(name: str, dims: Dims, *values: np.ndarray) -> dict[str, Any]:

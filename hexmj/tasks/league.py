@@ -11,11 +11,14 @@ from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import VARIED, known_names, load_controller
 from hexmj.io import markdown_table, settings
 from hexmj.measures.figures import network_rules, starts_in_words
-from hexmj.plotting import FEWER, NOTHING, SERIES, head, heat_map, in_figure, picture, tidy
+from hexmj.plotting import SERIES, head, in_figure, picture, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+FEWER = "\N{BULLET}"
+"""Mark of a cell from which refused starts are left out."""
 
 OWN = ("own", "own-0.3", "own-0.5", "robust-0.1", "lasting", "lasting-0.3")
 NETWORK = ("uncoordinated", "hws", "ldvs", "ldvs-tripod", *OWN)
@@ -126,8 +129,18 @@ def matrix_figure(result: "xr.Dataset") -> "Figure":
     names, tasks = shown.controller.values.tolist(), shown.task.values.tolist()
     figure = picture(max(5.0, 2.0 + 0.6 * len(tasks)), 2.6 + 0.36 * len(names))
     axes, fell = figure.subplots(), shown.fell.values
-    texts = np.array([[_cell(shown.isel(controller=i, task=j)) for j in range(len(tasks))] for i in range(len(names))])
-    heat_map(axes, tasks, fell, texts, cmap="YlOrRd", vmin=0.0, vmax=1.0)
+    image = axes.imshow(fell, aspect="auto", cmap="YlOrRd", vmin=0.0, vmax=1.0)
+    dark = image.to_rgba(fell)[..., :3] @ [0.3, 0.59, 0.11] < 0.5
+    for i, j in np.argwhere(np.isfinite(fell)):
+        cell, style = shown.isel(controller=i, task=j), {"color": "white" if dark[i, j] else "0.1", "fontsize": 9}
+        middle, low, high = (_short(cell[f"fell{end}"].item()) for end in ("", "_low", "_high"))
+        mark = FEWER if cell.n_refused.item() else ""
+        axes.text(j, i - 0.22, f"{middle}{mark}", ha="center", va="center", fontweight="bold", **style)
+        axes.text(j, i + 0.22, f"{low}-{high}", ha="center", va="center", **style)
+    axes.tick_params(which="both", length=0)
+    axes.spines[:].set_visible(False)
+    axes.xaxis.tick_top()
+    axes.set_xticks(range(len(tasks)), tasks, fontsize=9, rotation=40, ha="left")
     axes.set_yticks(range(len(names)), [in_figure(name) for name in names], fontsize=9)
     known = np.nan_to_num(fell.mean(axis=0), nan=-1.0)
     finding = f"most falls in the task '{tasks[known.argmax()]}': {known.max():.2f} of the walks, on average"
@@ -136,12 +149,6 @@ def matrix_figure(result: "xr.Dataset") -> "Figure":
     refused = f"{FEWER} refused starts are left out" if shown.n_refused.any() else ""
     head(figure, finding, starts, "frequency of falls and its 95 % interval", refused)
     return figure
-
-
-def _cell(cell: "xr.Dataset") -> str:
-    """Return the text of a cell of the matrix: the frequency of falls, and its interval on a second line."""
-    middle, low, high = (_short(cell[f"fell{end}"].item()) for end in ("", "_low", "_high"))
-    return NOTHING if middle == "nan" else f"{middle}{FEWER if cell.n_refused.item() else ''}\n{low}-{high}"
 
 
 def cost_figure(result: "xr.Dataset") -> "Figure":

@@ -22,7 +22,7 @@ from hexmj.controllers.wrappers import LegLost as WithoutLeg
 from hexmj.errors import InputError
 from hexmj.io import attributes
 from hexmj.measures.study import UNITS, by_halves
-from hexmj.measures.tables import differences, frequencies, happened, over_start
+from hexmj.measures.tables import frequencies, happened, over_start
 from hexmj.plain import plain
 from hexmj.progress import Progress
 from hexmj.starts import check_draw, draw_starts
@@ -330,9 +330,6 @@ def summarised(table: "xr.Dataset") -> "xr.Dataset":
     reached = ~(table.fall <= table.event)  # events of walks that fall before them count as not met
     fell, lost = (happened(table[name]).where(reached).values for name in ("fall", "planned_loss"))
     new = frequencies("fell", fell, dims) | frequencies("lost", np.where(np.isnan(fell), np.nan, lost), dims)
-    names = table.controller.values.tolist()
-    reference = "ldvs" if "ldvs" in names else names[0]
-    new |= differences("fell_above", fell, fell[:, [names.index(reference)]], dims)
     upright = table.where(np.isinf(table.fall))
     means = {name: upright[name].mean("start") for name in ("path_distance", "margin", "least_margin")}
     means["heading_error"] = abs(upright.heading_error).mean("start")
@@ -342,7 +339,7 @@ def summarised(table: "xr.Dataset") -> "xr.Dataset":
     means["recovery"] = upright.recovery.median("start")
     means["n_refused"] = table.refused.sum("start")
     each = table.rename({name: f"{name}_each" for name in means if name in table})
-    return each.assign(new | means).assign_attrs(reference=reference)
+    return each.assign(new | means)
 
 
 def run_task(
@@ -369,11 +366,11 @@ def run_task(
     Returns:
         Over (task, controller): `fell`, the frequency of falls, and `lost`, that of losses of static stability of the
         plan, with 95 % Wilson intervals (`fell_low`, ...); in tasks with events, of the starts that do not fall before.
-        `fell_above` is the frequency of falls minus that of the `reference`, on the same starts. Means over the walks
-        without a fall: `path_distance`, the RMS distance to the commanded path [mm]; `heading_error` at the end [rad];
-        `progress`, the distance along the path over the commanded one; `margin` and `least_margin`, normalised by the
-        length of the shortest leg; the `cost` of transport along the path; the median `recovery` after a push [time
-        units]. `n_refused` is the number of starts that are left out, since their walks fail.
+        Means over the walks without a fall: `path_distance`, the RMS distance to the commanded path [mm];
+        `heading_error` at the end [rad]; `progress`, the distance along the path over the commanded one; `margin` and
+        `least_margin`, normalised by the length of the shortest leg; the `cost` of transport along the path; the
+        median `recovery` after a push [time units]. `n_refused` is the number of starts that are left out, since
+        their walks fail.
         Over (task, controller, start): the outcomes of each walk, see `TaskWalks.outcomes`; those with the name of a
         mean end in `_each`.
 
