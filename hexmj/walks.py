@@ -70,6 +70,8 @@ class PlannedWalk(Walk):
     aep_y: np.ndarray = field(default=None, kw_only=True)  # pyright: ignore[reportAssignmentType]
     """(step, start, leg) distance of the tip at the end of the present swing from the body axis [mm]; NaN, the default,
     if the swing moves along the body."""
+    level: np.ndarray = field(default=None, kw_only=True)  # pyright: ignore[reportAssignmentType]
+    """(step, start, leg) height of the ground for which the leg is lifted and lowered [mm]; by default 0."""
     left: np.ndarray = field(default=None, kw_only=True)  # pyright: ignore[reportAssignmentType]
     """(step, start) velocity to the left as a fraction of V_p; `velocity` is that forward. By default 0."""
     turn: np.ndarray = field(default=None, kw_only=True)  # pyright: ignore[reportAssignmentType]
@@ -78,7 +80,9 @@ class PlannedWalk(Walk):
     def __post_init__(self) -> None:
         super().__post_init__()
         steps = np.shape(self.velocity)
-        for name, value, shape in ("aep_y", np.nan, self.stance.shape), ("left", 0.0, steps), ("turn", 0.0, steps):
+        legs, numbers = self.stance.shape, ("left", "turn")
+        own = [("aep_y", np.nan, legs), ("level", 0.0, legs), *((name, 0.0, steps) for name in numbers)]
+        for name, value, shape in own:
             if getattr(self, name) is None:
                 object.__setattr__(self, name, np.broadcast_to(value, shape))
 
@@ -92,7 +96,7 @@ def extent(walk: Walk) -> str:
     return f"{steps} steps{end}, {starts} start{'s' * (starts != 1)}, V = {' to '.join(ends)}"
 
 
-PLANNED = ("x", "y", "stance", "aep", "aep_y", "height")
+PLANNED = ("x", "y", "stance", "aep", "aep_y", "height", "level")
 """Names of the arrays (step, start, leg) of a `PlannedWalk`."""
 
 AnyWalk = TypeVar("AnyWalk", bound=Walk)

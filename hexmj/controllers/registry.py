@@ -15,6 +15,7 @@ import numpy as np
 
 from hexmj.controllers.baselines import BASELINES
 from hexmj.controllers.baselines.evolved import EVOLVED, FOUND
+from hexmj.controllers.baselines.reflexes import Reflexes
 from hexmj.controllers.baselines.replanning import Replanning
 from hexmj.controllers.cruse1998 import LDVS, OWN_TABLES, PRESETS, TripodLifted, read_network
 from hexmj.controllers.protocol import Controller, check_controller_type
@@ -30,9 +31,10 @@ NAMED: dict[str, Controller] = {
     **BASELINES,
     "ldvs-tripod": TripodLifted(LDVS.weights, name="ldvs-tripod"),
     "ldvs-replans": Replanning(LDVS),
+    "ldvs-reflexes": Reflexes(LDVS),
 }
 """Name -> controller of this package: the presets, the baselines, LDVS with one tripod lifted at time 0,
-and LDVS that changes to a gait on five legs when the loss of a leg is announced."""
+LDVS that changes to a gait on five legs when the loss of a leg is announced, and LDVS with reflexes."""
 
 VARIED = re.compile(r"(?P<name>.+?)(?P<parts>(-(without|with)-\d)+)")
 """Pattern of a controller's name that switches mechanisms or rules off or on, such as ldvs-without-3."""

@@ -145,6 +145,7 @@ class SteeredPlan:
         self._origin, self._y = np.array(stride.geometry.origin), np.array(stride.geometry.y)
         self._middle, self._straight, self._waits = (stride.aep0 + stride.pep0) / 2, lines.straight, not lines.velocity
         self._stance = np.ones(starts.shape, dtype=bool)  # (start, leg) legs that stand now
+        self._level = np.zeros(starts.shape)
         self._feet = feet_on(lines, starts, stride)
         self.starts = starts if self._straight else self._feet[..., 0] - self._origin
         self.y = self._feet[..., 1].copy()
@@ -189,6 +190,7 @@ class SteeredPlan:
         if not self._lines.velocity:
             return self._halted(time)
         walk = replace(self._plan.advance(steps), time=time)
+        self._level = walk.level[-1]
         if not self._straight:
             walk = self._steered(walk)
         else:
@@ -222,6 +224,7 @@ class SteeredPlan:
             feet[n], stance[n] = self._feet, self._stance
         tips: dict[str, Any] = self._on_axes(feet, np.broadcast_to(goal, feet.shape))
         tips |= {"stance": stance, "height": np.broadcast_to(np.nan, shape)}
+        tips["level"] = np.broadcast_to(self._level, shape)
         return PlannedWalk(time, np.zeros(shape[:2]), **tips, geometry=self.stride.geometry)
 
     def _on_axes(self, feet: np.ndarray, goals: np.ndarray) -> dict[str, np.ndarray]:

@@ -30,6 +30,8 @@ class Step:
     """Distance of that tip from the body axis [mm]; by default, the swing moves along the body."""
     height: ArrayLike | None = None
     """Height of the tips above the ground [mm]; where NaN, the default, the body itself lifts and lowers the foot."""
+    level: ArrayLike | None = None
+    """Height of the ground for which the legs are lifted and lowered [mm]; by default 0."""
 
 
 @dataclass(eq=False)
@@ -61,7 +63,7 @@ class StepwisePlan:
         """
         stride, shape = self.stride, (steps, *self.starts.shape)
         v = np.array(commanded_velocities(self.velocity, self.age, steps, stride, self.acceleration))
-        defaults = {"y": stride.geometry.y, "aep": stride.aep0, "aep_y": np.nan, "height": np.nan}
+        defaults = {"y": stride.geometry.y, "aep": stride.aep0, "aep_y": np.nan, "height": np.nan, "level": 0.0}
         planned = {name: np.full(shape, defaults.get(name, 0.0)) for name in PLANNED} | {"stance": np.ones(shape, bool)}
         for n, now in enumerate(v):
             step = self.step(now.copy())

@@ -41,7 +41,7 @@ class TipTargets:
         self._x = np.array(starts, order="C")
         self._y = np.tile(stride.geometry.y, (len(starts), 1)) if y is None else np.array(y, order="C")
         self._stance = np.ones(starts.shape, dtype=bool)
-        self._lift, self._height = np.zeros(starts.shape), np.zeros(starts.shape)
+        self._lift, self._height, self._level = np.zeros((3, *starts.shape))
         self._substeps = conditions.substeps(stride)
         substep = 1000.0 * conditions.seconds(stride) / self._substeps
         self._rates = substep / conditions.lift_time, substep / conditions.landing_time, conditions.landing_distance
@@ -55,12 +55,12 @@ class TipTargets:
             Tips in the root frame, (n, substep, leg, 3): forward, left and up [mm].
         """
         tips = np.empty((len(ids), len(plan.time) * self._substeps, 6, 3))
-        arrays = plan.x, plan.y, plan.stance, plan.aep, plan.aep_y, plan.height
+        arrays = plan.x, plan.y, plan.stance, plan.aep, plan.aep_y, plan.height, plan.level
         planned = tuple(map(np.ascontiguousarray, arrays))  # one memory layout, so that numba compiles once
-        last = self._x, self._y, self._stance, self._lift, self._height
+        last = self._x, self._y, self._stance, self._lift, self._height, self._level
         _follow(planned, ids, last, self._substeps, self._rates, self._heights, self._origin, tips)
-        for values, old in ((plan.x, self._x), (plan.y, self._y), (plan.stance, self._stance)):
-            old[ids] = values[-1, ids]
+        for name in ("x", "y", "stance", "level"):
+            getattr(self, f"_{name}")[ids] = getattr(plan, name)[-1, ids]
         return tips
 
 
@@ -184,14 +184,14 @@ def _follow(planned: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any,
 
     Unless planned, the height is a smooth function of the phase of the lift. The phase rises to 1 in swing. It is
     lowered to 0 in stance, and over the last `landing` [mm] before the AEP to the share of `landing` that is left."""
-    x, y, stance, aep, aep_y, own_height = planned
-    x_old, y_old, s_old, lift, height_old = last
+    x, y, stance, aep, aep_y, own_height, level = planned
+    x_old, y_old, s_old, lift, height_old, level_old = last
     rise, sink, landing = rates
     step_height, standing_height = heights
     for i, start in enumerate(ids):
         for leg in range(6):
             x_from, y_from, s = x_old[start, leg], y_old[start, leg], s_old[start, leg]
-            phase, height = lift[start, leg], height_old[start, leg]
+            phase, height, low = lift[start, leg], height_old[start, leg], level_old[start, leg]
             for n in range(len(x)):
                 x_to, y_to, end, own = x[n, start, leg], y[n, start, leg], aep[n, start, leg], own_height[n, start, leg]
                 ahead, height_from, aside = x_to >= x_from, height, aep_y[n, start, leg]
@@ -210,6 +210,6 @@ def _follow(planned: Any, ids: Any, last: Any, m: int, rates: Any, heights: Any,
                     tip = tips[i, n * m + sub, leg]
                     tip[0] = origin[leg] + at
                     tip[1] = y_at
-                    tip[2] = height - standing_height
-                x_from, y_from, s = x_to, y_to, stance[n, start, leg]
+                    tip[2] = low + (level[n, start, leg] - low) * part + height - standing_height
+                x_from, y_from, s, low = x_to, y_to, stance[n, start, leg], level[n, start, leg]
             lift[start, leg], height_old[start, leg] = phase, height

@@ -24,7 +24,7 @@ OWN = ("own", "own-0.3", "own-0.5", "robust-0.1", "lasting", "lasting-0.3")
 NETWORK = ("uncoordinated", "hws", "ldvs", "ldvs-tripod", *OWN)
 """Weight sets of the 1998 network that take part in the league."""
 
-EVERYONE = (*NETWORK, "ldvs-replans", *BASELINES)
+EVERYONE = (*NETWORK, "ldvs-replans", "ldvs-reflexes", *BASELINES)
 """Names of all controllers of the league."""
 
 FOUR = ("ldvs", "graham", "walknet", "free")

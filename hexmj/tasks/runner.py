@@ -5,7 +5,7 @@ refused; all other starts walk as if it were not there.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
@@ -145,10 +145,12 @@ class TaskWalks:
     def plan(self, which: np.ndarray, threads: int | None) -> Plan:
         """Return the plan of the starts with indices `which`, (n,), at time 0."""
         task, starts = self.task, self.timetable.starts[which]
-        controller, own_feedback = self.disturbed(which), isinstance(self.controller, SensoryFeedback)
+        controller = self.disturbed(which)
         command: Any = task.whole_command
         command = command if command.velocity is None else command.velocity
-        if task.feedback or task.noise or task.delay or own_feedback:
+        if isinstance(self.controller, SensoryFeedback):
+            controller = replace(self.controller, controller=controller)
+        elif task.feedback or task.noise or task.delay:
             begun = begin(self.planner, starts[:1], self.velocity, self.stride)
             controller = controller if isinstance(begun, FeedbackPlan) else SensoryFeedback(controller)
         if task.noise or task.delay:
