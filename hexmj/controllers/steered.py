@@ -259,7 +259,7 @@ class SteeredPlan:
             self.sense = self._sense
 
     def _shorten_stances(self) -> None:
-        """Let standing legs lift off before their tips leave the boxes, if the wrapped plan can be told."""
+        """Let standing legs lift off before their tips leave the boxes, if the wrapped plan is steerable."""
         if not isinstance(self._plan, SteerablePlan):
             return
         low, high = _box(self.stride)

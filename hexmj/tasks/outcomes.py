@@ -8,8 +8,8 @@ from hexmj.physics.settle import Settled
 from hexmj.stability import walk_margin
 
 NORMAL = 2.0
-"""Deviation from the undisturbed walk, in standard deviations of its gait, up to which a walk has recovered; Revzen et
-al. 2013 (Biol. Cybern. 107, 179) use the same number."""
+"""Deviation from the undisturbed walk, in standard deviations of its gait, up to which a walk has recovered, in the
+sense of Revzen et al. 2013 (Biol. Cybern. 107, 179)."""
 
 
 class MarginSoFar:

@@ -3,9 +3,8 @@
 The planner searches step lengths and phases of periodic gaits on the five remaining legs, whose steps end at AEP_0, for
 the greatest minimum of the stability margin over a period. It then plans two periods of the best gaits from the present
 posture, beginning at several moments of the gait, and chooses the plan that is least unstable. From then on, a clock
-lifts the legs. Insects that lose a leg also change the phases of the others: Graham 1977 (J. exp.
-Biol. 70, 23), Grabowska et al. 2012 (J. exp. Biol. 215, 4255); their gaits are not copied. Fitted by us: nothing.
-Sensed: nothing.
+lifts the legs. Stick insects that lose a leg also change the phases of the others (Graham 1977, J. comp. Physiol. 116,
+91); their gaits are not copied. Fitted by us: nothing. Sensed: nothing.
 """
 
 from dataclasses import dataclass, replace
