@@ -64,7 +64,7 @@ class Command:
             vp: velocity V_p of a swinging foot in the walk [mm/s].
             times: time at which each part begins [s].
         """
-        forward, left, turn = ((numbers("twist", one) / vp).tolist() for one in (vx, vy, yaw_rate))
+        forward, left, turn = ((numbers("twist", rate) / vp).tolist() for rate in (vx, vy, yaw_rate))
         return cls(forward, left, turn, (numbers("times", times) * vp).tolist())
 
     @property

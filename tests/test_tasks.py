@@ -17,10 +17,9 @@ from hexmj.controllers.registry import load_controller
 from hexmj.controllers.wrappers import RISE, PoorSenses
 from hexmj.controllers.wrappers import LegLost as WithoutLeg
 from hexmj.errors import OutOfReach, SimulationError, StillThrown
-from hexmj.measures.study import by_halves
 from hexmj.tasks.league import EVERYONE, TASKS, cost_figure, entrants, league_markdown, matrix_figure
 from hexmj.tasks.outcomes import recovery_times
-from hexmj.tasks.runner import TaskStudy, TaskWalks, run_task
+from hexmj.tasks.runner import TaskStudy, TaskWalks, by_halves, run_task
 from hexmj.tasks.task import known_tasks, load_task
 from hexmj.timing import Stride
 from standing_still import Still, Stretched
@@ -121,7 +120,7 @@ def test_walks_that_fail_are_left_out(error: type[Exception]) -> None:
             raise error("refused")
         return which
 
-    assert np.concatenate([part for _, part in by_halves(np.arange(5), walked, True)]).tolist() == [0, 1, 3, 4]
+    assert np.concatenate([part for _, part in by_halves(np.arange(5), walked)]).tolist() == [0, 1, 3, 4]
 
 
 def test_a_push_is_recovered_when_velocities_are_usual_again() -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hexmj.cli.command import Answer, Command
 from hexmj.cli.measures import check_measure
@@ -12,9 +12,6 @@ from hexmj.cli.options import Figures, Output, Planning, Threads, build, network
 from hexmj.cli.output import interval, report_checks, table
 from hexmj.errors import InputError
 from hexmj.timing import Stride
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

@@ -350,13 +350,13 @@ def begin(
     x, planner, plans, ids = checked_starts(starts, stride), commanded(controller), [], []
     if len(each) not in (1, len(x)):
         raise InputError(f"command: {len(each)} commands; expected one, or one for each of {len(x)} starts")
-    for one in dict.fromkeys(each):
-        ids.append(np.array([n for n, own in enumerate(np.resize(np.array(each, object), len(x))) if own == one]))
-        v = one.velocity
+    for command in dict.fromkeys(each):
+        ids.append(np.array([n for n in range(len(x)) if each[n % len(each)] == command]))
+        v = command.velocity
         if v is not None and len(each) == 1 and planner is not controller:
             return planning.begin(controller, x, v, stride, threads=threads)
-        plan = planner.begin_commanded(x[ids[-1]], one.parts[0], stride, threads)
-        plans.append(plan if len(one.times) == 1 else TablePlan(plan, one))
+        plan = planner.begin_commanded(x[ids[-1]], command.parts[0], stride, threads)
+        plans.append(plan if len(command.times) == 1 else TablePlan(plan, command))
     return plans[0] if len(plans) == 1 else JoinedPlan(plans, ids)
 
 

@@ -81,7 +81,7 @@ class StepwisePlan:
         return PlannedWalk(time, v, **planned, geometry=stride.geometry)
 
     def set_velocity(self, velocity: np.ndarray) -> None:
-        """See `protocol.SteerablePlan`."""
+        """See `protocol.Plan`."""
         self.velocity = velocity
 
 

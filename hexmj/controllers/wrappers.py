@@ -63,7 +63,7 @@ class WrappedPlan:
             self.y = plan.y
 
     def set_velocity(self, velocity: np.ndarray) -> None:
-        """See `protocol.SteerablePlan`."""
+        """See `protocol.Plan`."""
         self._plan.set_velocity(velocity)
 
     def advance(self, steps: int) -> PlannedWalk:

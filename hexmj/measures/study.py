@@ -1,6 +1,6 @@
 """Base class of the studies, and the cell that most have: physical walks of one controller at one velocity."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
@@ -12,7 +12,7 @@ from hexmj.conditions import Conditions, check_ground
 from hexmj.controllers.planning import begin, check_velocities
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.controllers.wrappers import Begins, FromSteadyState, by_protocol
-from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
+from hexmj.errors import InputError
 from hexmj.io import attributes
 from hexmj.measures.tables import WalkSettings, observed, over_start, settings
 from hexmj.progress import Progress
@@ -111,14 +111,10 @@ class Study:
         same = self.n_starts, self.seed, conditions, self.stride, self.procedure
         return WalkSettings(controller, velocity, duration, *same)
 
-    def check_walks(self, velocities: Sequence[float], *conditions: Conditions) -> None:
-        """Raise InputError if adhesion presses the feet too deep into the ground, or a controller refuses a V_r."""
-        from hexmj.physics.settle import check_adhesion
-
+    def check_walks(self, velocities: Sequence[float]) -> None:
+        """Raise InputError if a controller refuses a V_r."""
         for controller in self.plans().values():
             check_velocities(by_protocol(controller, self.protocol), velocities, self.stride, self.procedure)
-        for varied in conditions:
-            check_adhesion(varied, self.stride, self.seed)
 
     def labelled(self, table: "xr.Dataset", study: str, **own: Any) -> "xr.Dataset":
         """Return a result with all settings of the study as attributes, from which it can be repeated.
@@ -141,28 +137,6 @@ def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Str
     from hexmj.physics.settle import settle
 
     return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)
-
-
-def by_halves(
-    which: np.ndarray, walk: Callable[[np.ndarray], Any], diverging: bool = False
-) -> Iterator[tuple[np.ndarray, Any]]:
-    """Walk the starts together; if that fails, walk each half separately, and so on. Leave out single starts that fail.
-
-    Yield the indices and outcomes of each part that succeeds. A walk fails if its start cannot stand, its targets are
-    out of reach or a push still acts at its end.
-
-    Args:
-        which: indices of the starts, (n,).
-        walk: returns the outcomes of starts, given by index; outcomes of a start must not depend on the other starts.
-        diverging: whether walks that diverge are left out too; if False, they raise a SimulationError.
-    """
-    try:
-        yield which, walk(which)
-    except (OutOfReach, SimulationError, StillThrown) as error:
-        if getattr(error, "state", None) and not diverging:
-            raise
-        for half in np.array_split(which, 2) if len(which) > 1 else ():
-            yield from by_halves(half, walk, diverging)
 
 
 def outcome_table(

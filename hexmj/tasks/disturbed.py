@@ -46,17 +46,17 @@ class TooFewStable(InputError):
 
 
 @dataclass(frozen=True, eq=False)
-class StableStarts:
-    """Random starts whose plan keeps static stability until the disturbance."""
+class TimedStarts:
+    """The starts of walks, and when each is disturbed."""
 
     starts: np.ndarray
     """(start, leg) tips at time 0 [mm]."""
     step: np.ndarray
     """(start,) number of steps before the disturbance."""
     draw: np.ndarray
-    """(start,) random number in [0, 1) that chooses which of the protracting legs is stopped."""
+    """(start,) random number in [0, 1) that chooses which of the swinging legs is stopped."""
     drawn: int
-    """Number of random starts drawn until enough stable starts were found."""
+    """Number of random starts drawn until these were found."""
 
 
 def find_stable_starts(
@@ -67,7 +67,7 @@ def find_stable_starts(
     stride: Stride,
     grid: int,
     command: Command | None = None,
-) -> StableStarts:
+) -> TimedStarts:
     """Return the first `n_starts` random starts of a seed whose plan is stable until the disturbance.
 
     The disturbance occurs at a random multiple of `grid` steps, uniform within the period of a single leg that follows
@@ -94,7 +94,7 @@ def find_stable_starts(
         found = np.flatnonzero(np.isinf(first_loss(starts, controller, walks, step * stride.dt, stride=stride)))
         if len(found) >= n_starts:
             found = found[:n_starts]
-            return StableStarts(starts[found], step[found], draw[found], int(found[-1]) + 1)
+            return TimedStarts(starts[found], step[found], draw[found], int(found[-1]) + 1)
     raise TooFewStable(
         f"fewer than n_starts = {n_starts} of {MOST_DRAWN} starts are stable until the disturbance at V = {velocity:g}"
     )

@@ -24,12 +24,8 @@ class MarginSoFar:
     def __init__(self, settled: Settled) -> None:
         """Begin without a margin."""
         size = len(settled.starts)
-        self._settled, self.least, self._sum, self._count = (
-            settled,
-            np.full(size, np.inf),
-            np.zeros(size),
-            np.zeros(size),
-        )
+        self._settled, self.least = settled, np.full(size, np.inf)
+        self._sum, self._count = np.zeros((2, size))
 
     @property
     def mean(self) -> np.ndarray:

@@ -4,11 +4,11 @@ A start whose walk fails, since it cannot stand, a target is out of reach or the
 refused; all other starts walk as if it were not there.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -19,15 +19,15 @@ from hexmj.controllers.protocol import Controller, FeedbackPlan, Plan, check_con
 from hexmj.controllers.steered import begin, pace
 from hexmj.controllers.wrappers import FromSteadyState, PoorSenses
 from hexmj.controllers.wrappers import LegLost as WithoutLeg
-from hexmj.errors import InputError
+from hexmj.errors import InputError, OutOfReach, SimulationError, StillThrown
 from hexmj.io import attributes
-from hexmj.measures.study import UNITS, by_halves
+from hexmj.measures.study import UNITS
 from hexmj.measures.tables import frequencies, happened, over_start
 from hexmj.plain import plain
 from hexmj.progress import Progress
 from hexmj.starts import check_draw, draw_starts
 from hexmj.sweep import Cell, Execution, over_axes, run_study
-from hexmj.tasks.disturbed import NEVER, Disturbance, Disturbed, collect_postures, find_stable_starts
+from hexmj.tasks.disturbed import NEVER, Disturbance, Disturbed, TimedStarts, collect_postures, find_stable_starts
 from hexmj.tasks.task import Disturbing, Halt, LegLost, LegStopped, Push, Task, load_task, stops
 from hexmj.timing import Acceleration, Stride, observation_duration, steps_within
 from hexmj.tipping import Pendulum
@@ -57,19 +57,6 @@ EXTRA = {"margin": "1", "least_margin": "1", "recovery": "time unit", "event": "
 walk is undisturbed again -> unit."""
 
 
-class Timetable(NamedTuple):
-    """The starts of a task and the times of its events."""
-
-    starts: np.ndarray
-    """(start, leg) tips at time 0 [mm]."""
-    step: np.ndarray
-    """(start,) number of steps before events at a random time; 0 without such events."""
-    draw: np.ndarray
-    """(start,) random number in [0, 1) that chooses which of the swinging legs is stopped."""
-    drawn: int
-    """Number of random starts drawn until enough stable starts were found."""
-
-
 @dataclass(frozen=True)
 class TaskWalks:
     """Walks of one controller in one task; `outcomes` is the function of a cell."""
@@ -86,16 +73,15 @@ class TaskWalks:
         return pace(self.task.whole_command, self.stride)
 
     @cached_property
-    def timetable(self) -> Timetable:
+    def timetable(self) -> TimedStarts:
         """The starts of the walks, and the random times of events."""
         n, stride = self.n_starts, self.stride
         if self.task.drawn_times:
             command = self.task.whole_command
             curved = None if command.velocity is not None else command
-            stable = find_stable_starts(self.planner, self.velocity, n, self.seed, stride, GRID, curved)
-            return Timetable(stable.starts, stable.step, stable.draw, stable.drawn)
+            return find_stable_starts(self.planner, self.velocity, n, self.seed, stride, GRID, curved)
         draw = np.random.default_rng([self.seed, 2]).uniform(size=(n, 2))[:, 1]
-        return Timetable(draw_starts(n, self.seed, stride), np.zeros(n, dtype=int), draw, n)
+        return TimedStarts(draw_starts(n, self.seed, stride), np.zeros(n, dtype=int), draw, n)
 
     @property
     def planner(self) -> Controller:
@@ -206,7 +192,7 @@ class TaskWalks:
         from hexmj.physics.outcomes import Outcomes
 
         everyone = np.arange(self.n_starts)
-        parts = [part.assign_coords(start=which) for which, part in by_halves(everyone, self._walked(threads), True)]
+        parts = [part.assign_coords(start=which) for which, part in by_halves(everyone, self._walked(threads))]
         units = {member.name: UNITS.get(member.name, "1") for member in fields(Outcomes)} | PATH | EFFORT | EXTRA
         if parts:
             found = xr.concat(parts, "start").reindex(start=everyone)
@@ -314,6 +300,23 @@ class TaskStudy:
             "stride": asdict(self.stride),
         }
         return summarised(table).assign_attrs(attributes(recorded))
+
+
+def by_halves(which: np.ndarray, walk: Callable[[np.ndarray], Any]) -> Iterator[tuple[np.ndarray, Any]]:
+    """Walk the starts together; if that fails, walk each half separately, and so on. Leave out single starts that fail.
+
+    Yield the indices and outcomes of each part that succeeds. A walk fails if its start cannot stand, its targets are
+    out of reach, it diverges, or a push still acts at its end.
+
+    Args:
+        which: indices of the starts, (n,).
+        walk: returns the outcomes of starts, given by index; outcomes of a start must not depend on the other starts.
+    """
+    try:
+        yield which, walk(which)
+    except (OutOfReach, SimulationError, StillThrown):
+        for half in np.array_split(which, 2) if len(which) > 1 else ():
+            yield from by_halves(half, walk)
 
 
 def _recorded(task: Task) -> dict[str, Any]:

@@ -283,7 +283,7 @@ class NetworkPlan:
         self.slow_down(which)
 
     def set_velocity(self, velocity: np.ndarray) -> None:
-        """See `protocol.SteerablePlan`."""
+        """See `protocol.Plan`."""
         for row in (kernel.V, kernel.V_FINAL):
             self._write(row, velocity[:, None], 1)
         self.slow = self.final = velocity
