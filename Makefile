@@ -56,6 +56,7 @@ docs: .venv/dev
 results: bench
 	.venv/bin/python -m benchmarks.scaling
 	.venv/bin/hexmj biology --processes 2
+	.venv/bin/python examples/insects.py
 	.venv/bin/hexmj reproduce --beside lasting --processes 2
 	.venv/bin/hexmj league --processes 2
 	for varied in "vp 40 80 160" "centre-of-mass -2 0 2" "standing-height 8 10 12" "landing-time 10 20 40" \

@@ -138,6 +138,8 @@ def biology(folder: Path) -> list[str]:
     result = io.load(folder / "biology.nc")
     with as_shipped():
         io.save_figure(hexmj.plot(result), IMAGES / "biology.png")
+    for name in ("steps", "recovery"):
+        shutil.copyfile(folder.parent / f"insects/{name}.png", IMAGES / f"{name}.png")
     known = [row for row in table_rows(result) if row[2] != "-"]
     rows = []
     for (name, source), group in groupby(known, lambda row: (VARIED.sub("", row[0]), row[4])):

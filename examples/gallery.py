@@ -17,16 +17,22 @@ import hexmj
 
 FILM = hexmj.Film(width=480, height=360, fps=15.0, slow_motion=2.0)
 SIDE = hexmj.Film(width=640, height=360, fps=15.0, slow_motion=1.0, camera="side")
+TOP = hexmj.Film(width=400, height=400, fps=12.0, slow_motion=1.0, camera="top")
 WIDE = hexmj.Film(width=640, height=360, fps=15.0, slow_motion=2.0)
 GAITS = ("graham", "walknet-reacog", "own-0.5")
 
 
-def walked(name: str, velocity: float, duration: float, start: int = 0, **conditions: Any) -> Dataset:
-    """Record a physical walk of one start of seed 0."""
-    starts = hexmj.draw_starts(start + 1, seed=0)[start:]
-    settings = hexmj.Conditions(**conditions)
+def walked(name: str, velocity: float | hexmj.Command, duration: float, **conditions: Any) -> Dataset:
+    """Record a physical walk of the first start of seed 0, which follows V_r or a command."""
+    starts, settings = hexmj.draw_starts(1, seed=0), hexmj.Conditions(**conditions)
     walk = hexmj.physical_walk(starts, hexmj.load_controller(name), velocity, duration, conditions=settings)
     return hexmj.record(walk, title=name)
+
+
+def on_command(task: str, *names: str) -> list[Dataset]:
+    """Record a walk of each controller by the command of a task."""
+    settings = hexmj.load_task(task)
+    return [walked(name, settings.command, settings.duration) for name in names]
 
 
 def planned(name: str, velocity: float, duration: float) -> Dataset:
@@ -55,6 +61,8 @@ def main() -> None:
     film([walked("uncoordinated", 0.5, 60.0), walked("ldvs", 0.5, 60.0)], out / "fall.webp", FILM)
     film([walked("ldvs", 0.4, 300.0, ground="step", ground_height=3.0, ground_at=60.0)], out / "step.webp", SIDE)
     film([walked(name, 0.5, 80.0) for name in GAITS], out / "gaits.webp", FILM)
+    film(on_command("slalom", "graham"), out / "slalom.webp", TOP)
+    film(on_command("turn", "ldvs", "graham"), out / "turn.webp", TOP)
     with TemporaryDirectory() as folder:
         body = servo_hexapod.robot(Path(folder))
         film([servo_hexapod.tilting(body)], out / "robot.webp", WIDE, body)

@@ -296,7 +296,7 @@ SEARCH = "search --observation-time start --starts 20 --budget 20 --refine-budge
 FILM = "--width 160 --height 120 --fps 10"
 FOOT_PATH = "--vp 120 --step-height 9 --standing-height 11 --lift-time 10 --landing-time 15 --contact-gap 5"
 MASSES = "--load 1 --centre-of-mass 2 --leg-mass 0.5 --friction 0.5 --grasp 0.5 --longest-substep 0.3"
-MODELS = ("walknet", "tegotae", "evolved", "turning.py:Turning", "contact_controller.py:Feeler")
+MODELS = ("walknet", "tegotae", "evolved", "contact_controller.py:Feeler")
 
 # name -> a command, which is run with --json and --out, or a function
 FEATURES: dict[str, str | Callable[[], Any]] = {

@@ -36,7 +36,7 @@ PAGES = {path.relative_to(ROOT).as_posix(): text_of(path) for path in FILES}
 LINES = dict.fromkeys(re.findall(r"^    hexmj (.+?)(?: +# (.+))?$", "\n".join(PAGES.values()), flags=re.MULTILINE))
 COMMANDS = [command for command, comment in LINES if not comment.startswith("long")]
 EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
-LONG_EXAMPLES = {"gallery", "model_variants", "servo_hexapod", "train_cma", "train_ppo", "variants"}
+LONG_EXAMPLES = {"gallery", "insects", "model_variants", "servo_hexapod", "train_cma", "train_ppo", "variants"}
 """Examples that take minutes. Their functions are tested at a small size, here, in test_learned or by features.py."""
 
 

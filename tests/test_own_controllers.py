@@ -14,7 +14,6 @@ from hexmj.gaits import CYCLES, steady_state_gait
 from hexmj.measures.physical import PhysicalWalk
 from hexmj.physics.rollout import drive
 from hexmj.physics.settle import settle
-from hexmj.rotations import heading
 from hexmj.search.problems import Sample
 from hexmj.walks import PlannedWalk
 from tiers import few_of
@@ -23,7 +22,6 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 OWN = {
     "tripod": f"{EXAMPLES / 'tripod.py'}:Tripod",
     "feeler": f"{EXAMPLES / 'contact_controller.py'}:Feeler",
-    "turning": f"{EXAMPLES / 'turning.py'}:Turning",
 }
 STRIDE = hexmj.Stride()
 
@@ -110,19 +108,6 @@ def sensed_contact(contact: np.ndarray) -> Sensed:
         joints=np.zeros((1, 6, 3)), torques=np.zeros((1, 6, 3)), tilt=np.zeros((1, 2)), velocity=np.zeros((1, 3)),
         turning=np.zeros((1, 3)),
     )  # fmt: skip
-
-
-@pytest.mark.parametrize("curvature", [0.008, -0.008])
-def test_turning_is_seen_in_the_recording(curvature):
-    """Tips move beside their lines, and the insect's heading grows by curvature times way."""
-    turning = type(hexmj.load_controller(OWN["turning"]))(curvature)  # pyright: ignore[reportCallIssue]
-    walked = hexmj.physical_walk(hexmj.draw_starts(1, 0), turning, 0.5, 120.0)
-    recording = hexmj.record(walked)
-    aside = recording.planned_y.values - np.array(STRIDE.geometry.y)
-    assert np.abs(aside).max(axis=0)[[0, 3]].min() > 1.0  # of the front feet
-    turned = np.unwrap(heading(recording.qpos.values[:, 3:7]))
-    assert turned[-1] == pytest.approx(curvature * 0.5 * 120.0, rel=0.15)
-    assert np.isinf(recording.fall_time)
 
 
 Change = Callable[[PlannedWalk, int], dict[str, np.ndarray]]
