@@ -176,12 +176,13 @@ def test_a_fallen_insect_begins_at_the_next_start_after_a_while():
         if session.walk.fell_on:
             break
     assert session.walk.fell_on in session.walk.conditions.body.trunk
+    assert 0.0 < session.walk.lost_at <= session.walk.moment.seconds
     seen = session.walk.moment
     assert session.tick(0.5 * LYING_TIME) is seen
     session.tick(0.6 * LYING_TIME)
     assert session.start == 1
     assert not session.walk.fell_on
-    session.paused = True
+    session.speed = 0.0
     assert session.tick(0.05) is session.walk.moment
 
 

@@ -21,9 +21,9 @@ from hexmj.errors import InputError
 from hexmj.measures.physical import physical_walk
 from hexmj.replay.recording import record, save_recording
 from hexmj.starts import draw_starts
-from hexmj.view.browser import BrowserView, check_port, page_server
+from hexmj.view.browser import CHART_INTERVAL, BrowserView, check_port, page_server
 from hexmj.view.live import LiveWalk
-from hexmj.view.session import LiveSession
+from hexmj.view.session import LiveSession, ticks
 
 STARTS, GRAHAM = draw_starts(8, seed=1), load_controller("graham")
 
@@ -62,10 +62,10 @@ def test_the_page_is_served_and_its_sliders_change_the_walk(view):
     view.controls["p1_i"].value = 3.0
     until(view, lambda: walk.controller.weights.p1_i == 3.0)
     seconds, charted = walk.moment.seconds, list(view._recent)
-    view.session.paused = True
+    view.session.speed = 0.0
     view.step(0.02)
     assert list(view._recent) == charted != []
-    view.session.paused = False
+    view.session.speed = 1.0
     view.controls["V_p"].value = 120.0
     until(view, lambda: walk.conditions.vp == 120.0)
     assert walk.moment.seconds < seconds
@@ -134,7 +134,7 @@ def test_the_command_serves_until_ctrl_c(recorded, tmp_path):
 
 @pytest.mark.slow
 def test_a_browser_shows_the_walk(view):
-    """The readout follows the walk; nothing comes from elsewhere."""
+    """The readout follows the walk at 25 poses a second; nothing comes from elsewhere."""
     view.step(0.02)
     with tab() as opened:
         opened.resize(1280, 800)
@@ -144,6 +144,11 @@ def test_a_browser_shows_the_walk(view):
         for _ in range(10):
             view.step(0.1)
         assert view.session.walk.moment.seconds > before
+        view.session.speed, used = 0.5, time.process_time()
+        for n, passed in zip(range(60), ticks(), strict=False):
+            view.step(passed, n % CHART_INTERVAL == 0)
+        assert time.process_time() - used < 60 / 25  # of one core, for 25 poses a second
+        view.step(0.02)
         opened.wait(f"document.body.innerText.includes('{view.session.walk.moment.seconds:.2f} s')")
         assert opened.value("document.querySelectorAll('canvas').length") >= 1
         rows = "[...document.querySelectorAll('svg text')].find((text) => text.textContent === 'R3')"

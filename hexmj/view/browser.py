@@ -160,8 +160,8 @@ class BrowserView:
                 lambda _: self._change(lambda walk: walk.begin(conditions=replace(walk.conditions, vp=float(vp.value))))
             )
             self.controls["V_p"] = vp
-            paused = gui.add_checkbox("pause", False)
-            paused.on_update(lambda _: setattr(self.session, "paused", paused.value))
+            speed = gui.add_slider("speed", 0.0, 1.0, 0.1, 1.0, hint="fraction of real time; 0 pauses")
+            speed.on_update(lambda _: setattr(self.session, "speed", float(speed.value)))
             restarts = {"same start": self.session.begin, "next start": self.session.begin_next}
             buttons = gui.add_button_group("", tuple(restarts))
             buttons.on_click(lambda _: self._change(lambda _: restarts[buttons.value]()))
@@ -277,11 +277,11 @@ class BrowserView:
 
     def _show_charts(self, moment: Moment) -> None:
         session, walk, stable = self.session, self.session.walk, moment.margin > 0
-        state = f"fell on {walk.fell_on}" if walk.fell_on else f"{'within' if stable else 'outside'} the polygon"
+        state = f"{'within' if stable else 'outside'} the polygon"
         sign = "\N{HEAVY CHECK MARK}" if stable and not walk.fell_on else "\N{HEAVY MULTIPLICATION X}"
         self._readout.content = (
             f"**{margin_in_words(moment.margin)}** {sign} {state}\n\nV = {moment.velocity:.2f}, {moment.seconds:.2f} s,"
-            f" start {session.start}\n\n_{session.message}_"
+            f" start {session.start}{', ' * bool(walk.loss_in_words)}{walk.loss_in_words}\n\n_{session.message}_"
         ).removesuffix("\n\n__")
         if len(self._recent) < 2:
             return

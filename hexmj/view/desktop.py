@@ -52,8 +52,8 @@ def view_live(session: LiveSession) -> None:
     for window, passed in _opened(walk.conditions, lambda key: session.attempt(partial(_press, session, key))):
         moment = session.tick(passed)
         seen = moment.feet[:, :2], moment.stance, moment.centre_of_mass, moment.planned_tips
-        state = f"fell on {walk.fell_on}" if walk.fell_on else margin_in_words(moment.margin)
-        text = "forward {:.2f}, left {:.2f}, turn {:.4f}".format(*walk.command.parts[0]) + f", {state}"
+        text = "forward {:.2f}, left {:.2f}, turn {:.4f}".format(*walk.command.parts[0])
+        text = ", ".join(filter(None, (text, walk.loss_in_words, margin_in_words(moment.margin))))
         _show(window, walk.conditions, moment.qpos, moment.margin, seen, text, session.message)
 
 
@@ -88,7 +88,7 @@ def _press(session: LiveSession, key: int) -> None:
     """Change the live walk as the pressed key asks for, see `KEYS`."""
     walk, change = session.walk, STEERS.get(chr(key))
     if key == SPACE:
-        session.paused = not session.paused
+        session.speed = 0.0 if session.speed else 1.0
     elif key == ENTER:
         session.begin_next()
     elif chr(key) == "X":

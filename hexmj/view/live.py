@@ -65,6 +65,8 @@ class LiveWalk:
     """Current state of the insect and its plan."""
     trace: list[Moment]
     """States after each step of the last call of `advance`; the last element is `moment`."""
+    lost_at: float
+    """Time at which static stability is first lost [s]; inf before."""
     fell_on: str
     """Part of the trunk that has touched the ground; "" while the insect walks."""
 
@@ -111,7 +113,7 @@ class LiveWalk:
             self._rollout = Rollout(settled, [self._push], threads=1)
             self._push_steps = steps_in_chunk(settled.substeps)
             self.start, self.conditions, self.settled = start, conditions, settled
-            self.trace, self.fell_on, self._time_left = [], "", 0.0
+            self.trace, self.lost_at, self.fell_on, self._time_left = [], np.inf, "", 0.0
             self._last_step: PlannedWalk | None = None
             self._walk(2)  # the end of a step is known when the next begins
 
@@ -136,6 +138,12 @@ class LiveWalk:
                 return True
             self.begin()
         return False
+
+    @property
+    def loss_in_words(self) -> str:
+        """Text of the first loss of stability and the fall, such as 'stability lost at 0.35 s, fell on thorax'."""
+        lost = f"stability lost at {self.lost_at:.2f} s" if np.isfinite(self.lost_at) else ""
+        return ", ".join(filter(None, (lost, f"fell on {self.fell_on}" if self.fell_on else "")))
 
     @contextmanager
     def _restored_if_it_fails(self) -> Iterator[None]:
@@ -190,7 +198,9 @@ class LiveWalk:
         if chunk.fell.any():
             trunk = chunk.sensors[0, chunk.valid[0] - 1, self.settled.compiled.columns.trunk]
             self.fell_on = self.conditions.body.trunk[int(np.argmax(trunk > 0))]
-        self.trace += self._moments(chunk)
+        new = [*self._moments(chunk)]
+        self.trace += new
+        self.lost_at = min([self.lost_at, *(moment.seconds for moment in new if not moment.margin > 0)])
         if self.trace:
             self.moment = self.trace[-1]
 

@@ -36,22 +36,22 @@ class LiveSession:
     Attributes:
         walk: the live walk.
         start: number of its start.
-        paused: whether the walk stands still; viewers set it.
+        speed: speed of the view as a fraction of real time; viewers set it. 0 pauses the walk.
         message: error message of the last change, or "".
     """
 
     def __init__(self, walk: LiveWalk, start: int, starts: Callable[[int], np.ndarray]) -> None:
         """Show `walk`, which has the number `start`; `starts` returns a start, (leg,) [mm], by its number."""
-        self.walk, self.start, self.paused, self.message = walk, start, False, ""
+        self.walk, self.start, self.speed, self.message = walk, start, 1.0, ""
         self._starts, self._tried, self._lying = starts, start, 0.0
 
     def tick(self, passed: float) -> Moment:
-        """Advance the walk by `passed` [s] unless it is paused, and return its state."""
+        """Advance the walk by `speed` times `passed` [s], and return its state."""
         self.walk.trace = []
-        if self.paused:
+        if not self.speed:
             return self.walk.moment
         if not self.walk.fell_on:
-            if not self._succeeds(lambda: self.walk.advance(min(passed, LONGEST_STEP))):
+            if not self._succeeds(lambda: self.walk.advance(self.speed * min(passed, LONGEST_STEP))):
                 self._succeeds(self.begin)
         elif (lying := self._lying + passed) < LYING_TIME:
             self._lying = lying
