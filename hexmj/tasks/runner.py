@@ -256,7 +256,7 @@ class TaskStudy:
     tasks: Sequence[Task]
     controllers: Mapping[str, Controller]
     """Controllers by their names in the result."""
-    n_starts: int = 100
+    n_starts: int = 50
     """Number of random starts in each task, the same for every controller."""
     seed: int = field(default=17, kw_only=True)
     """Seed of the random starts; by default one on which no preset was optimised."""
