@@ -92,7 +92,7 @@ def one_command(name: str) -> str:
         kind = getattr(member.type, "__origin__", None)
         kind = getattr(kind, "__origin__", kind)  # without OmitArgPrefixes
         if not is_dataclass(kind):
-            positional = f" {config_of(member).metavar}"
+            positional = f" {member.name.upper()}"
             parts.append(option(member))
             continue
         options = "\n\n".join(option(part) for part in fields(kind))
@@ -103,16 +103,10 @@ def one_command(name: str) -> str:
     return "\n\n".join([f"### hexmj {name}", summary, usage, *parts])
 
 
-def config_of(member: Any) -> Any:
-    """Return tyro's configuration of an option: its name, metavar and help."""
-    return next(part for part in member.type.__metadata__ if hasattr(part, "metavar"))
-
-
 def option(member: Any) -> str:
     """Return an option as an entry of a definition list."""
-    config, default = config_of(member), member.default
-    positional = (config.metavar or "").startswith("[")
-    head = config.metavar if positional else f"--{config.name} {config.metavar or ''}".strip()
+    (config, *positional), default = member.type.__metadata__, member.default
+    head = config.name.upper() if positional else f"--{config.name}"
     value = " ".join(map(str, default)) if isinstance(default, tuple) else str(default)
     known = default is not MISSING and default is not None and default is not False and value
     return f"`{head}`\n:   {config.help}{f' Default: `{value}`.' if known else ''}"

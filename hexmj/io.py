@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.errors import InputError
 from hexmj.files import read_netcdf, replacing, write_netcdf, write_text
 from hexmj.version import __version__
 
@@ -21,7 +20,7 @@ TEXTS = ("study", "model", "over", "reference", "title", "body", "ground")
 """Attributes that `settings` returns as text, even if the text looks like JSON."""
 
 MANIFEST = "manifest.json"
-"""Name of the file that records how results were made; some commands put a prefix before it."""
+"""Name of the file that records how results were made."""
 
 LIBRARIES = ("mujoco", "numpy", "scipy", "numba", "xarray", "matplotlib")
 """Packages whose versions a manifest records, in addition to hexmj and Python."""
@@ -85,19 +84,6 @@ def _parsed(attribute: Any) -> Any:
         return attribute
 
 
-def results_folder(path: Path | str) -> Path:
-    """Make a directory for results and return its path.
-
-    Raises:
-        InputError: the directory cannot be made.
-    """
-    try:
-        Path(path).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {path}: {error.strerror}") from None
-    return Path(path)
-
-
 def save_figure(figure: "Figure", path: Path) -> Path:
     """Write a figure in the format of the path's suffix, without a date, so that equal figures are equal files."""
     undated: dict[str, Any] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
@@ -135,15 +121,3 @@ def save_manifest(command: Sequence[str], settings: Mapping[str, Any], files: Se
 def versions() -> dict[str, str]:
     """Return the versions of hexmj, Python and the packages that change numbers, by name."""
     return {"hexmj": __version__, "python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
-
-
-def read_manifest(path: Path) -> dict[str, Any]:
-    """Read a manifest that `save_manifest` wrote.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read: {error}") from None

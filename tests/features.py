@@ -154,12 +154,12 @@ def shown(line: str) -> Any:
 
 
 def exported() -> Any:
-    """List the columns of a recording, and write two recordings as CSV; return the numbers of the first file."""
+    """Write two recordings as CSV; return the numbers of the first file."""
     recordings()
-    result = answer("export walk.nc plan.nc --csv")
+    result = answer("export walk.nc plan.nc")
     numbers = np.genfromtxt(result["files"][0], delimiter=",", skip_header=1)
-    sizes = {table["recording"]: [table["rows"], len(table["columns"])] for table in result["tables"]}
-    return {"sizes": sizes, "files": result["files"], "numbers": numbers, "text": text("export plan.nc")}
+    sizes = {table["recording"]: [table["rows"], table["columns"]] for table in result["tables"]}
+    return {"sizes": sizes, "files": result["files"], "numbers": numbers}
 
 
 def scheduler(line: str) -> Any:

@@ -1,25 +1,25 @@
 """Base classes of the commands: they parse options, show help, run a study, write its files and print the answer."""
 
-import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 from textwrap import fill
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from hexmj.cli.options import Figures, Output, Planning, Results, Workers, build, flat, options_class
+from hexmj.cli.options import Figures, Output, Planning, Workers, build, option_fields, options_class, values_of
 from hexmj.cli.output import lists_of, show
-from hexmj.errors import RenderingError
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from hexmj.sweep import Study
 
+STUDY = (Output, Planning, Workers, Figures)
+"""Options of most studies."""
 
 MANY = 12
 """Number of files from which on only their folder is printed."""
@@ -27,20 +27,13 @@ MANY = 12
 
 @dataclass
 class Answer:
-    """Answer of a command: its JSON object, its tables and lines for the terminal, and the content of its manifest."""
+    """Answer of a command: its JSON object, its tables and lines for the terminal, and the files that it wrote."""
 
     json: Mapping[str, Any]
     lines: Iterable[Any]
     files: list[Path] = field(default_factory=list)
-    """Files that the command wrote."""
     settings: Mapping[str, Any] | None = None
-    """Settings that the manifest records; with None, no manifest is written."""
-    manifest: str = "manifest.json"
-    """File name of the manifest in the folder of --out."""
-    result: "xr.Dataset | None" = None
-    """Result of a study. The manifest records its settings, and the terminal shows its `settings_line`."""
-    closing: Sequence[str] = ()
-    """Lines after the names of the files."""
+    """Settings that the manifest in the folder of --out records; with None, no manifest is written."""
 
 
 class Command:
@@ -57,14 +50,12 @@ class Command:
     examples: ClassVar[tuple[str, str]]
     """Arguments of the two examples that `--help` shows."""
 
-    def options(self, name: str, help: bool = True) -> type:
-        """Return the class of options that tyro parses; without `help`, its options have no help texts."""
-        return self._options_of(self.sources, self.defaults, name, help)
-
-    def _options_of(self, places: Iterable[type | str], defaults: Mapping[str, Any], name: str, help: bool) -> type:
-        sources = [imported(place) if isinstance(place, str) else place for place in places]
-        choices: Any = {"positional": self.positional, "hidden": self.hidden, "defaults": defaults}
-        return options_class(name.replace("-", "_"), *sources, help=help, **choices)
+    def options(self, name: str) -> type:
+        """Return the class of options that tyro parses."""
+        title, defaults = name.replace("-", "_"), {"out": Path("results") / name, **self.defaults}
+        sources = [imported(place) if isinstance(place, str) else place for place in self.sources]
+        options = (option_fields(source, title, self.hidden, defaults) for source in sources)
+        return options_class(chain.from_iterable(options), title, self.positional)
 
     def parse(self, name: str, words: list[str]) -> SimpleNamespace:
         """Parse the words after the command's name, and return the values of all options by name."""
@@ -75,13 +66,12 @@ class Command:
         if help:
             print(fill(" ".join((self.__doc__ or "").split()), 80), end="\n\n")
         try:
-            parser: Any = {"prog": f"hexmj {name}", "description": "", "config": markers}
-            parsed = tyro.cli(self.options(name, help), args=words, **parser)
+            parsed = tyro.cli(self.options(name), prog=f"hexmj {name}", description="", args=words, config=markers)
         except SystemExit:
             if help:
                 print("Examples:", *(f"  hexmj {name} {example}".rstrip() for example in self.examples), sep="\n")
             raise
-        return SimpleNamespace(**vars(flat(parsed)), command=[name, *words])
+        return SimpleNamespace(**values_of(parsed), command=[name, *words])
 
     def run(self, given: SimpleNamespace) -> Answer | None:
         """Run the command with its parsed options. Return the answer, or None if the command has printed it itself."""
@@ -89,21 +79,17 @@ class Command:
 
     def execute(self, given: SimpleNamespace) -> None:
         """Run the command, write the manifest, and print the answer."""
-        from hexmj.io import json_text, save_manifest, settings
+        from hexmj.io import MANIFEST, json_text, save_manifest
 
         if (answer := self.run(given)) is None:
             return
-        files, result = answer.files, answer.result
-        recorded = answer.settings if result is None else settings(result)
-        if recorded is not None and given.out:
-            files.append(save_manifest(given.command, recorded, files, given.out / answer.manifest))
+        files = answer.files
+        if answer.settings is not None and given.out:
+            files.append(save_manifest(given.command, answer.settings, files, given.out / MANIFEST))
         if given.json:
-            head = {} if result is None else {"settings": recorded, "searched": searched(given)}
-            print(json_text(head | dict(answer.json) | {"files": files}))
+            print(json_text({**answer.json, "files": files}))
         else:
-            line = [] if result is None else [settings_line(given, result)]
-            paths = map(str, files) if len(files) < MANY else [f"{len(files)} files in {given.out}"]
-            show(*answer.lines, *line, *paths, *answer.closing)
+            show(*answer.lines, *(map(str, files) if len(files) < MANY else [f"{len(files)} files in {given.out}"]))
 
 
 class StudyCommand(Command):
@@ -112,18 +98,9 @@ class StudyCommand(Command):
     study: ClassVar[str]
     """Place of the study's dataclass, such as "studies.biology:Biology"."""
     data: ClassVar[str]
-    """Name of the NetCDF file; an option in braces, as in "{over}.nc", is replaced by its value."""
+    """Name of the NetCDF file."""
     figures: ClassVar[Mapping[str, str]]
     """File name of a figure without its suffix -> name of the figure for `hexmj.plot`."""
-    manifest: ClassVar[str] = "manifest.json"
-    own: ClassVar[tuple[type, ...]] = ()
-    """Dataclasses whose fields become options of this command in addition to the study's options."""
-    planning: ClassVar[tuple[type, ...]] = (Planning,)
-    """Dataclasses of options for planning; () for a command without these options."""
-
-    def options(self, name: str, help: bool = True) -> type:
-        sources = (*self.own, self.study, Results, Output, *self.planning, Workers, Figures)
-        return self._options_of(sources, {"out": Path("results") / name, **self.defaults}, name, help)
 
     def build(self, given: SimpleNamespace) -> "Study":
         """Build the study from the options."""
@@ -150,19 +127,19 @@ class StudyCommand(Command):
 
     def run(self, given: SimpleNamespace) -> Answer:
         """Run the study, write its files unless --out is None, and return the answer."""
-        from hexmj.io import results_folder, save
+        from hexmj.io import save, settings
 
-        study, folder = self.build(given), given.out and results_folder(given.out)
+        study = self.build(given)
+        if given.out:
+            given.out.mkdir(parents=True, exist_ok=True)
         result, files = self.result(given, study), list[Path]()
-        if folder:
-            files.append(save(result, folder / self.data.format(**vars(given))))
-            for name, which in self.figures.items():
-                files.append(draw(result, folder / f"{name.format(**vars(given))}.{given.format}", which))
+        if given.out:
+            files.append(save(result, given.out / self.data))
+            files += [draw(result, given.out / f"{name}.{given.format}", which) for name, which in self.figures.items()]
             files += self.write_more(given, result)
-        manifest = self.manifest.format(**vars(given))
-        closing = [] if folder else ["Nothing is saved; --out FOLDER saves the table, a figure and a manifest."]
-        own = {"manifest": manifest, "result": result, "closing": closing}
-        return Answer(self.summary(result), self.shown(study, result), files, **own)
+        recorded, searched = settings(result), searched_on_seed(given)
+        answer = {"settings": recorded, "searched": searched} | self.summary(result)
+        return Answer(answer, [*self.shown(study, result), settings_line(result, searched)], files, recorded)
 
 
 def imported(place: str) -> Any:
@@ -191,19 +168,7 @@ def draw(result: "xr.Dataset", path: Path, which: str | None = None) -> Path:
         return save_figure(plot(result, which), path)
 
 
-def filmed(path: Path, recordings: "Sequence[xr.Dataset]", *film: Any) -> list[Path]:
-    """Film recordings and return [path]; if this machine cannot render films, print the reason and return []."""
-    from hexmj.replay.video import render
-
-    try:
-        render(recordings, path, *film, progress=True)
-    except RenderingError as error:
-        print(f"hexmj: no video: {error}", file=sys.stderr)
-        return []
-    return [path]
-
-
-def searched(given: SimpleNamespace) -> dict[str, list[int]]:
+def searched_on_seed(given: SimpleNamespace) -> dict[str, list[int]]:
     """Return each controller that a search found on the starts of --seed -> all seeds of its search."""
     from hexmj.controllers.registry import searched_on
 
@@ -212,12 +177,12 @@ def searched(given: SimpleNamespace) -> dict[str, list[int]]:
     return {base: seeds for base, seeds in found.items() if given.seed in seeds}
 
 
-def settings_line(given: SimpleNamespace, result: "xr.Dataset") -> str:
+def settings_line(result: "xr.Dataset", searched: Mapping[str, list[int]]) -> str:
     """Return the settings of a result as one line, with a warning if a controller was searched on the same starts."""
     from hexmj.measures.figures import caption
 
     line = caption(result).replace("$", "").replace("\N{NO-BREAK SPACE}", " ")
-    if found := searched(given):
-        seed = next(seed for seed in count(1998) if not any(seed in seeds for seeds in found.values()))
-        line += f"; {', '.join(found)}: found by a search on these starts, use fresh starts (--seed {seed})"
+    if searched:
+        seed = next(seed for seed in count(1998) if not any(seed in seeds for seeds in searched.values()))
+        line += f"; {', '.join(searched)}: found by a search on these starts, use fresh starts (--seed {seed})"
     return line

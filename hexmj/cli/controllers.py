@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from hexmj.cli.command import Answer, Command
-from hexmj.cli.measures import check_measure
-from hexmj.cli.options import Figures, Output, Planning, Threads, build, network_rules
+from hexmj.cli.measures import DYNAMIC
+from hexmj.cli.options import Figures, Json, Output, Planning, Threads, build, check_kinematic, network_rules
 from hexmj.cli.output import interval, report_checks, table
 from hexmj.errors import InputError
 from hexmj.timing import Stride
@@ -21,8 +20,6 @@ class SearchOptions:
     velocities: tuple[float, ...] = (0.3,)
     """Velocity V_r of the walks (problem 1), or the least and the greatest V_r of a range (problem 2); fractions of
     V_p, 0 <= V < 1."""
-    out: Path = Path("results/search")
-    """Folder for the controller found (TOML), the history (NetCDF), a figure, a manifest and cached evaluations."""
     form: str = "ldvs"
     """Parameters that are searched. Of the 1998 network: nine (hws), ten with a neutral position that depends on the
     velocity (ldvs), 29 with mirror symmetry (mirrored), or all 58 weights (general). With the name of a controller of
@@ -73,7 +70,8 @@ class Search(Command):
 
         if not 1 <= len(given.velocity) <= 2:
             raise InputError(f"--velocity = {given.velocity}; expected one velocity, or the two ends of a range")
-        check_measure(given)
+        if given.measure != "physical":
+            check_kinematic(given, DYNAMIC if given.measure == "dynamic" else ())
         effort = build(Effort, given)
         own: dict[str, Any] = {"form": named_form(given.form, effort.beginning, **network_rules(given))}
         own |= {"low": given.velocity[0], "high": given.velocity[-1]}
@@ -96,7 +94,7 @@ class CheckController(Command):
     """Check whether a controller follows the interface of hexmj. A failed check reports its error, and the exit code is
     then 1."""
 
-    sources = (CheckOptions, Output)
+    sources = (CheckOptions, Json)
     positional = "name"
     examples = ("ldvs", "mine.py:Mine --velocity 0.2 0.5 --json")
 

@@ -1,5 +1,6 @@
 """`hexmj doctor` and `hexmj rerun`."""
 
+import json
 import os
 import subprocess
 import sys
@@ -10,9 +11,10 @@ from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
+from typing import NamedTuple
 
 from hexmj.cli.command import Command
-from hexmj.cli.options import Output
+from hexmj.cli.options import Json
 from hexmj.cli.output import report_checks, show
 from hexmj.errors import InputError
 from hexmj.rendering import PACKAGES
@@ -29,21 +31,19 @@ with mujoco.Renderer(model, 48, 64) as renderer:
 """Script that renders a frame. It runs in a separate process, because a faulty driver can end its process."""
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Result of one check: what it found, or the error and its remedy; the remedy is empty if the cause is unknown."""
+class Finding(NamedTuple):
+    """Result of one check: what it found, or the error and, if the cause is known, the remedy."""
 
     name: str
     well: bool
     found: str
-    remedy: str = ""
 
 
 class Doctor(Command):
     """List the versions of packages, and check rendering, films and a short walk. A failed check shows its error, and
     a remedy if the cause is known; the exit code is then 1."""
 
-    sources = (Output,)
+    sources = (Json,)
     examples = ("", "--json")
 
     def run(self, given: SimpleNamespace) -> None:
@@ -56,8 +56,9 @@ def examine() -> Iterator[Finding]:
         try:
             yield Finding(check.__name__, True, check())
         except Exception as error:
-            remedies = (remedy for words, remedy in REMEDIES.items() if words in str(error))
-            yield Finding(check.__name__, False, (str(error) or repr(error)).splitlines()[-1], next(remedies, ""))
+            found = (str(error) or repr(error)).splitlines()[-1]
+            remedies = (f"{found} Remedy: {remedy}" for words, remedy in REMEDIES.items() if words in str(error))
+            yield Finding(check.__name__, False, next(remedies, found))
 
 
 def versions() -> str:
@@ -118,8 +119,8 @@ class RerunOptions:
     """Options of `hexmj rerun`."""
 
     result: Path
-    """Folder with the results of a command, or a manifest in it. Relative paths in that command, such as mine.py, are
-    read from the current directory."""
+    """Folder with the results of a command. Relative paths in that command, such as mine.py, are read from the current
+    directory."""
     threads: int | None = None
     """Number of threads of the repeated command; results do not depend on it."""
 
@@ -128,27 +129,24 @@ class Rerun(Command):
     """Repeat the command that a manifest records, in a temporary folder, and compare all numbers bit for bit. Package
     versions that have changed are listed. The exit code is 1 if a number differs."""
 
-    sources = (RerunOptions, Output)
+    sources = (RerunOptions, Json)
     positional = "result"
-    examples = ("results/compare", "results/map/vp-manifest.json --threads 1 --json")
+    examples = ("results/compare", "results/flss --threads 1 --json")
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.cli.main import run
-        from hexmj.io import MANIFEST, json_text, read_manifest
+        from hexmj.io import MANIFEST, json_text
 
-        found = [given.result] if given.result.is_file() else sorted(given.result.glob(f"*{MANIFEST}"))
-        if not found:
-            raise InputError(f"{given.result} has no {MANIFEST}; expected the folder of a command's results")
-        then = read_manifest(found[0])
+        then = json.loads((given.result / MANIFEST).read_text(encoding="utf-8"))
         names = [name for name in then["files"] if name.endswith(".nc")]
         if not names:
-            raise InputError(f"{found[0]} lists no NetCDF file; only NetCDF files can be compared")
+            raise InputError(f"{given.result / MANIFEST} lists no NetCDF file; only NetCDF files can be compared")
         words = [] if given.threads is None else ["--threads", str(given.threads)]
         with tempfile.TemporaryDirectory(prefix="hexmj-rerun-") as folder:
             with redirect_stdout(StringIO()):
                 run([*then["command"], *words, "--out", folder])
-            files = {name: _difference(found[0].parent / name, Path(folder) / name) for name in names}
-            now = read_manifest(Path(folder) / found[0].name)
+            files = {name: _difference(given.result / name, Path(folder) / name) for name in names}
+            now = json.loads((Path(folder) / MANIFEST).read_text(encoding="utf-8"))
         pairs = {name: [then["versions"].get(name), version] for name, version in now["versions"].items()}
         versions = {name: [old, new] for name, (old, new) in pairs.items() if old != new}
         equal = not any(files.values())

@@ -71,13 +71,13 @@ def main() -> None:
         if isinstance(error, SystemError) and not isinstance(error.__cause__, KeyboardInterrupt):
             raise  # Ctrl-C within compiled code is a SystemError
         _exit("Stopped. A repeated study resumes after its finished cells.", 130)
-    except InputError as error:
-        _exit(error, 2)
     except (SimulationError, RenderingError) as error:
         _exit(error, 1)
     except BrokenPipeError:  # the reader of standard output has ended, such as `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except (InputError, OSError) as error:  # an OSError names the file
+        _exit(error, 2)
 
 
 def run(words: list[str]) -> None:

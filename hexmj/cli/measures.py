@@ -1,32 +1,33 @@
 """`hexmj walk`, `hexmj flss` and `hexmj compare`."""
 
 import math
+import sys
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hexmj.cli.command import Answer, Command, StudyCommand, draw, filmed
-from hexmj.cli.options import Figures, Output, Planning, Threads, build, controller, no_effect
+from hexmj.cli.command import STUDY, Answer, Command, StudyCommand, draw
+from hexmj.cli.options import Figures, Output, Planning, Threads, build, check_kinematic, controller
 from hexmj.cli.output import Column, four_digits, grid, report_line
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.wrappers import by_protocol
-from hexmj.errors import InputError
+from hexmj.errors import InputError, RenderingError
 from hexmj.measures.tables import Measure
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-PHYSICAL = tuple(member.name for member in fields(Conditions) if member.name != "body")
-"""Options that set a field of `Conditions`, in the order of the fields."""
-
 FOOT_PATH = ("vp", "step_height", "standing_height", "lift_time", "landing_time")
-"""Options of `PHYSICAL` that also change the recording of a kinematic walk."""
+"""Conditions that also change the recording of a kinematic walk."""
+
+DYNAMIC = ("vp", "standing_height")
+"""Conditions that also change the dynamic measure."""
 
 EXPLAINED = """\
 t: observation time [time units]
@@ -42,9 +43,6 @@ speed: walked over commanded, of starts without a fall"""
 """Lines that explain the tables of `hexmj compare`."""
 
 CASES = "both, kin., phys., none: starts with both, only a loss, only a fall, neither"
-
-DYNAMIC = ("vp", "standing_height")
-"""Options of `PHYSICAL` on which the dynamic measure depends."""
 
 WALKS = ("walks", "plain_walks")
 """Numbers of walks in a result of --precision."""
@@ -64,8 +62,6 @@ class WalkOptions:
 
     physical: bool = False
     """Simulate the insect in MuJoCo. Without this option, the walk is kinematic and the recording shows the plan."""
-    out: Path = Path("results/walk")
-    """Folder for the recording, the figure and the manifest."""
 
 
 class Walk(Command):
@@ -76,24 +72,21 @@ class Walk(Command):
     examples = ("--velocity 0.5", "--controller wilson --physical --seed 7 --json")
 
     def run(self, given: SimpleNamespace) -> Answer:
-        from hexmj.io import attributes, results_folder
         from hexmj.measures.compare import REPORTED
         from hexmj.replay.recording import Start, recording_summary, save_recording
 
         if not given.physical:
-            no_effect(given, [*(set(PHYSICAL) - {*FOOT_PATH}), "feedback"], "without --physical")
-        start, out = build(Start, given), results_folder(given.out)
+            check_kinematic(given, FOOT_PATH)
+        start, out = build(Start, given), given.out
         title = f"{start.controller.name}, V = {given.velocity:g}"
         walked = start.recorded(given.physical, title, given.threads)
         settings = start.settings(**{given.controller: start.controller}) | {"physical": given.physical}
         files = [save_recording(walked, out / "recording.nc"), draw(walked, out / f"walk.{given.format}")]
         summary = recording_summary(walked)
-        lines = [f"{key}: {_in_words(key, value)}" for key, value in summary.items() if value is not None]
+        lines = [title, *(f"{key}: {_in_words(key, value)}" for key, value in summary.items() if value is not None)]
         lines += [f"{name}: {walked[name].attrs['long_name']}" for name in REPORTED if given.physical]
-        result = walked.drop_vars(walked.variables).assign_attrs(attributes(settings))
-        closing = [f"Next: hexmj {command} {files[0]}" for command in ("render", "page", "view")]
-        closing += [] if given.physical else ["Or simulate this walk: add --physical"]
-        return Answer(summary | {"settings": settings}, [title, *lines], files, result=result, closing=closing)
+        lines += [f"Next: hexmj {command} {files[0]}" for command in ("render", "page", "view")]
+        return Answer(summary | {"settings": settings}, lines, files, settings)
 
 
 @dataclass(frozen=True)
@@ -122,23 +115,20 @@ class Flss(StudyCommand):
     run."""
 
     study = "measures.kinematic:KinematicFlss"
-    own = (FlssOptions,)
+    sources = (FlssOptions, study, *STUDY)
     defaults = {"out": None}  # noqa: RUF012
     data = "flss.nc"
     figures = {"flss": "flss"}  # noqa: RUF012
     examples = ("--velocity 0.5", "--measure physical --starts 50 --out results/flss")
 
     def build(self, given: SimpleNamespace) -> Any:
-        check_measure(given)
-        if given.precision is not None:
-            no_effect(given, ["starts"], "with --precision", {"starts": None})
         if given.measure != "physical":
             if given.precision is not None:
                 raise InputError(f"--precision = {given.precision:g} needs --measure physical")
+            check_kinematic(given, DYNAMIC if given.measure == "dynamic" else ())
             return super().build(given)
         from hexmj.measures.compare import PhysicalFlss
 
-        no_effect(given, ["range_of"], "with --measure physical", {"range_of": None})
         planned = controller(given, given.controller)
         return build(PhysicalFlss, given, controllers={planned.name: planned})
 
@@ -151,8 +141,7 @@ class Flss(StudyCommand):
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         from hexmj.measures.compare import physical_report
 
-        lists = {name: result[name].values.tolist() for name in ["velocity", *_over_velocity(result)]}
-        return lists | ({"report": physical_report(result)} if "fall" in result else {})
+        return super().summary(result) | ({"report": physical_report(result)} if "fall" in result else {})
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.measures.compare import physical_report
@@ -167,14 +156,6 @@ class Flss(StudyCommand):
         yield f"low, high: 95 % interval; duration: observation time [time units]{spread}"
         if measure == "physical":
             yield report_line(physical_report(result))
-
-
-def check_measure(given: SimpleNamespace) -> None:
-    """Raise InputError if an option is set that has no effect on the measure of --measure."""
-    if given.measure != "physical":
-        used = DYNAMIC if given.measure == "dynamic" else ()
-        names = [name for name in (*PHYSICAL, "feedback") if name not in used]
-        no_effect(given, names, f"with --measure {given.measure}")
 
 
 def _over_velocity(result: "xr.Dataset") -> list[str]:
@@ -204,22 +185,18 @@ class Compare(StudyCommand):
     `--vp 40 80`, are an axis of the result. Repeat the command to resume a stopped run."""
 
     study = "measures.compare:Comparison"
-    own = (CompareOptions,)
+    sources = (CompareOptions, study, *STUDY)
     defaults = {"controller": ("ldvs", "uncoordinated")}  # noqa: RUF012
     data = "comparison.nc"
     figures = {"comparison": "comparison"}  # noqa: RUF012
     examples = ("--precision 0.05", "--controller hws wilson --velocity 0.5 --starts 20 --no-video")
-
-    def build(self, given: SimpleNamespace) -> Any:
-        if given.precision is not None:
-            no_effect(given, ["starts"], "with --precision", {"starts": 60})
-        return super().build(given)
 
     def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
         """Write a recording and a video of the first controller, at the first value of each axis and near V = 0.3, from
         a start that stays stable if any."""
         from hexmj.measures.figures import axes_of
         from hexmj.replay.recording import Start, save_recording
+        from hexmj.replay.video import render
 
         if given.no_video:
             return []
@@ -231,20 +208,18 @@ class Compare(StudyCommand):
         begun = by_protocol(controller(given, given.controller[0]), given.protocol)
         first = build(Start, given, controller=begun, velocity=v, start=start)
         walked = first.recorded(True, name, given.threads)
-        return [save_recording(walked, given.out / "recording.nc"), *filmed(given.out / "gait.mp4", [walked])]
+        files = [save_recording(walked, given.out / "recording.nc"), given.out / "gait.mp4"]
+        try:
+            render([walked], files[1], progress=True)
+        except RenderingError as error:
+            print(f"hexmj: no video: {error}", file=sys.stderr)
+            return files[:1]
+        return files
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        from hexmj.io import settings
-        from hexmj.measures.compare import AGREEMENT, MEASURES, physical_report
-        from hexmj.measures.figures import axes_of
+        from hexmj.measures.compare import physical_report
 
-        summary = {axis: result[axis].values.tolist() for axis in (*axes_of(result), "velocity")}
-        keys = [measure + end for measure in MEASURES for end in ("", "_low", "_high")]
-        keys += [key for key in ("agreement", "dynamic_agreement", *AGREEMENT, *WALKS) if key in result]
-        for name in result.controller.values:
-            summary[name] = {key: result[key].sel(controller=name).values.tolist() for key in keys}
-        durations = {"duration": result.duration.values.tolist()}
-        return summary | {"report": physical_report(result), "settings": settings(result) | durations}
+        return super().summary(result) | {"report": physical_report(result)}
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.measures.compare import AGREEMENT, MEASURES, physical_report

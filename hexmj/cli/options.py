@@ -1,7 +1,7 @@
 """Options of the command line, generated from the dataclasses of settings."""
 
 import ast
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, make_dataclass, replace
 from inspect import getsource
 from itertools import pairwise
@@ -31,10 +31,6 @@ CONTROLLER = (
 )
 """Ways to name a controller, for the help texts."""
 
-TYPES = {int: "INT", float: "FLOAT", str: "TEXT", Path: "PATH"}
-METAVARS = {"controller": "NAME", "observation_time": "TIME"}
-"""Type, or name of an option -> placeholder of the value in `--help`."""
-
 
 @dataclass(frozen=True)
 class Planning:
@@ -51,19 +47,19 @@ class Planning:
 
 
 @dataclass(frozen=True)
-class Output:
-    """Options of the output."""
+class Json:
+    """Options of a command that writes no files."""
 
     json: bool = False
     """Print the answer as one JSON object, and nothing else on standard output."""
 
 
 @dataclass(frozen=True)
-class Results:
-    """Where a study writes its files."""
+class Output(Json):
+    """Options of a command that writes files."""
 
     out: Path = Path("results")
-    """Folder for figures, NetCDF, manifest and cached results."""
+    """Folder for all files, such as figures, NetCDF, manifest and cached results."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +97,21 @@ class Workers:
 
 
 @dataclass(frozen=True)
+class Accelerating:
+    """Options of a walk that accelerates."""
+
+    acceleration: float | None = None
+    """Acceleration a of Eq. 11 from --initial-velocity to --velocity [1 / time unit]; the paper's is 0.00008. By
+    default, walks do not accelerate."""
+    initial_velocity: float = Acceleration.start
+    """V_r at the beginning of a walk with --acceleration."""
+
+
+NESTED = {Conditions: Conditions, Stride: Stride, Acceleration: Accelerating}
+"""Type of a field -> dataclass whose fields become the options of this field."""
+
+
+@dataclass(frozen=True)
 class Option:
     """One option: a field of the class that tyro parses."""
 
@@ -108,6 +119,15 @@ class Option:
     kind: Any
     default: Any
     group: str
+    text: str
+
+    def member(self, *markers: Any) -> Any:
+        """Return the option as a field for `make_dataclass`: name, annotated type and default."""
+        unset = self.default is None or self.default is False or self.default == ()
+        shown: Any = {"help_behavior_hint": ""} if unset else {}
+        config = arg(name=self.name.replace("_", "-"), help=self.text, **shown)
+        default = field() if self.default is MISSING else field(default=self.default)
+        return self.name, Annotated[self.kind, config, *markers], default
 
 
 def option_fields(
@@ -115,8 +135,8 @@ def option_fields(
 ) -> Iterator[Option]:
     """Yield one option for each field of a dataclass of settings.
 
-    A field of type `Conditions`, `Stride` or `Acceleration` becomes one option for each of its own fields. If the
-    dataclass has a field `axes`, the option of a condition that is a number takes several values.
+    A field of a type in `NESTED` becomes one option for each field of another dataclass. If the settings have a field
+    `axes`, the option of a condition that is a number takes several values.
 
     Args:
         settings: the dataclass. Its class variable `hidden`, if any, names fields and conditions without an option;
@@ -125,69 +145,71 @@ def option_fields(
         hidden: further fields without an option.
         defaults: option -> default that replaces the one of the dataclass.
     """
-    hints, group = get_type_hints(settings), getattr(settings, "group", title)
-    left_out = {"body", *hidden, *getattr(settings, "hidden", ())}
+    hints, texts, group = get_type_hints(settings), _texts(settings), getattr(settings, "group", title)
+    left_out = {"body", "axes", *hidden, *getattr(settings, "hidden", ())}
     for member in fields(settings):
         kind, name = hints[member.name], NAMES.get(member.name, member.name)
-        default = _default(member, defaults.get(name, MISSING))
-        if member.name in left_out or name in left_out or name == "axes":
+        if left_out & {member.name, name}:
             continue
-        if several := {Conditions, Stride}.intersection((kind, *get_args(kind))):
-            (kind,) = several
-            for part in option_fields(kind, "walk" if kind is Stride else "conditions", left_out):
-                value = defaults.get(part.name, getattr(default, part.name, part.default))
-                if kind is Conditions and "axes" in hints and part.kind in (float, int):
-                    part, value = replace(part, kind=tuple[part.kind, ...]), (value,)
-                yield Option(part.name, part.kind, value, part.group)
-        elif Acceleration in (kind, *get_args(kind)):
-            yield Option("acceleration", float | None, defaults.get("acceleration"), "walk")
-            yield Option("initial_velocity", float | None, None, "walk")
+        default = defaults.get(name, _default(member))
+        if nested := NESTED.keys() & {kind, *get_args(kind)}:
+            (kind,) = nested
+            for part in option_fields(NESTED[kind], "conditions" if kind is Conditions else "walk", left_out, defaults):
+                axis = "axes" in hints and kind is Conditions and part.kind in (float, int)
+                yield replace(part, kind=tuple[part.kind, ...], default=(part.default,)) if axis else part
         else:
-            yield Option(name, kind, default, group)
+            yield _option(name, kind, default, group, texts.get(name, ""))
 
 
-def options_class(
-    title: str,
-    *sources: type,
-    positional: str = "",
-    hidden: Collection[str] = (),
-    defaults: Mapping[str, Any] = {},
-    help: bool,
-) -> type:
+def _option(name: str, kind: Any, default: Any, group: str, text: str) -> Option:
+    """Return the option of a field, with a type that tyro can parse."""
+    optional = NoneType in get_args(kind)
+    inner = next(part for part in get_args(kind) if part is not NoneType) if optional else kind
+    if get_origin(inner) in (tuple, Sequence, Mapping):
+        kind = tuple[get_args(inner)[0], ...]
+        kind = kind | None if optional else kind
+        default = default if default is None or default is MISSING else tuple(default)
+    if kind is Controller:
+        kind, default = str, "ldvs" if default is MISSING else default
+    elif kind is Geometry:
+        kind, default = Literal[*GEOMETRIES], next(key for key, lines in GEOMETRIES.items() if lines == default)
+    elif name == "observation_time":
+        kind = float | str
+    if name == "controller":
+        each = "It is" if kind is str else "Each is"
+        text = f"{text or 'Controller that plans the walk.'} {each} {CONTROLLER}."
+    return Option(name, kind, default, group, text)
+
+
+def options_class(options: Iterable[Option], title: str, positional: str) -> type:
     """Return the class that tyro parses, with one member for each group of options.
 
     Args:
+        options: all options; of those with the same name, the first counts.
         title: name of the group of the command's own options.
-        sources: dataclasses whose fields become options; if two have the same option, the first dataclass defines it.
         positional: option whose value is given without the option's name.
-        hidden: fields without an option.
-        defaults: option -> default that replaces the one of its dataclass.
-        help: whether the options get their help texts.
     """
     found: dict[str, Option] = {}
-    for source in sources:
-        for option in option_fields(source, title, hidden, defaults):
-            found.setdefault(option.name, option)
-    texts = _texts(Stride, Conditions, *reversed(sources)) if help else {}
+    for option in options:
+        found.setdefault(option.name, option)
+    members = [found.pop(positional).member(Positional)] if positional else []
     common = [found.pop(name) for name in COMMON if name in found]
     groups: dict[str, list[Option]] = {"common": common, title: [], "walk": [], "conditions": [], "execution": []}
     for option in found.values():
-        groups.setdefault("positional" if option.name == positional else option.group, []).append(option)
-    members: list[Any] = [_member(option, texts, Positional) for option in groups.pop("positional", [])]
-    for name, options in groups.items():
-        if options:
-            name = name.replace("-", "_")
-            kind = make_dataclass(name, [_member(option, texts) for option in options], namespace={"__doc__": ""})
+        groups[option.group].append(option)
+    for name, group in groups.items():
+        if group:
+            kind = make_dataclass(name, [option.member() for option in group], namespace={"__doc__": ""})
             members.append((name, Annotated[OmitArgPrefixes[kind], arg(help="")], field(default_factory=kind)))
     return make_dataclass("Options", members)
 
 
-def flat(parsed: Any) -> SimpleNamespace:
-    """Return the options of all groups of a parsed `options_class` in one namespace."""
+def values_of(parsed: Any) -> dict[str, Any]:
+    """Return option -> value of all groups of a parsed `options_class`."""
     values = {}
     for name, value in vars(parsed).items():
         values |= vars(value) if is_dataclass(value) else {name: value}
-    return SimpleNamespace(**values)
+    return values
 
 
 def build(settings: Any, given: SimpleNamespace, **own: Any) -> Any:
@@ -208,14 +230,15 @@ def build(settings: Any, given: SimpleNamespace, **own: Any) -> Any:
             case "controllers":
                 values["controllers"] = controllers(given)
             case "conditions":
-                values["conditions"] = conditions(given, _default(member))
+                values["conditions"] = conditions(given)
             case "axes":
                 several = _given(Conditions, given).items()
                 values["axes"] = {k: v for k, v in several if isinstance(v, tuple) and len(v) != 1}
             case "stride":
-                values["stride"] = stride(given)
+                values["stride"] = replace(Stride(**_given(Stride, given)), geometry=GEOMETRIES[given.geometry])
             case "acceleration":
-                values["acceleration"] = acceleration(given)
+                rate = given.acceleration
+                values["acceleration"] = None if rate is None else Acceleration(rate, given.initial_velocity)
             case name:
                 value = getattr(given, NAMES.get(name, name), None)
                 values |= {} if value is None else {name: value}
@@ -224,8 +247,6 @@ def build(settings: Any, given: SimpleNamespace, **own: Any) -> Any:
 
 def controller(given: SimpleNamespace, name: str) -> Controller:
     """Load a controller by name, and apply the options --order, --model-variant and --feedback."""
-    from dataclasses import replace
-
     from hexmj.controllers.registry import load_controller
 
     found = load_controller(name)
@@ -263,38 +284,17 @@ def controllers(given: SimpleNamespace) -> dict[str, Controller]:
     return dict(zip(names if len(set(names)) == len(names) else given.controller, found, strict=True))
 
 
-def conditions(given: SimpleNamespace, defaults: Conditions | None = None) -> Conditions:
-    """Return the conditions that the options set, of several values the first; the others are those of `defaults`."""
-    values = {k: v if isinstance(v, tuple) else (v,) for k, v in _given(Conditions, given).items()}
-    return Conditions(**(defaults or Conditions()).values() | {k: v[0] for k, v in values.items() if v})
+def conditions(given: SimpleNamespace) -> Conditions:
+    """Return the conditions that the options set; of several values, the first counts."""
+    values = _given(Conditions, given)
+    return Conditions(**{k: v[0] if isinstance(v, tuple) else v for k, v in values.items() if v != ()})
 
 
-def stride(given: SimpleNamespace) -> Stride:
-    """Return the stride that the options set."""
-    values = _given(Stride, given)
-    values["geometry"] = GEOMETRIES[values.get("geometry", "fig1")]
-    return Stride(**values)
-
-
-def acceleration(given: SimpleNamespace) -> Acceleration | None:
-    """Return the acceleration of Eq. 11 that the options set, or None without --acceleration."""
-    if given.acceleration is None:
-        if given.initial_velocity is not None:
-            raise InputError(f"--initial-velocity = {given.initial_velocity:g} has no effect without --acceleration")
-        return None
-    start = Acceleration.start if given.initial_velocity is None else given.initial_velocity
-    return Acceleration(given.acceleration, start)
-
-
-def no_effect(given: SimpleNamespace, names: Collection[str], reason: str, more: Mapping[str, Any] = {}) -> None:
-    """Raise InputError if an option in `names` has no effect, for a `reason` such as "without --physical", but is set.
-
-    An option is set if it differs from its default; `more` holds defaults of options that are no conditions.
-    """
-    defaults = Conditions().values() | {"feedback": False} | dict(more)
-    for name in names:
-        if (value := getattr(given, name, defaults[name])) != defaults[name]:
-            raise InputError(f"--{name.replace('_', '-')} = {value} has no effect {reason}; leave it out")
+def check_kinematic(given: SimpleNamespace, used: Collection[str] = ()) -> None:
+    """Raise InputError if an option is set that changes only physical walks, except for the conditions in `used`."""
+    for name, default in (Conditions().values() | {"feedback": False}).items():
+        if name not in used and getattr(given, name, default) != default:
+            raise InputError(f"--{name.replace('_', '-')} has no effect on kinematic walks; leave it out")
 
 
 def _given(settings: type, given: SimpleNamespace) -> dict[str, Any]:
@@ -302,53 +302,17 @@ def _given(settings: type, given: SimpleNamespace) -> dict[str, Any]:
     return {name: value for name, value in vars(given).items() if name in names}
 
 
-def _default(member: Any, replacement: Any = MISSING) -> Any:
-    if replacement is not MISSING:
-        return replacement
+def _default(member: Any) -> Any:
     return member.default if member.default_factory is MISSING else member.default_factory()
 
 
-def _member(option: Option, texts: Mapping[str, str], *markers: Any) -> Any:
-    """Return an option as a field for `make_dataclass`: name, annotated type and default."""
-    name, kind, default = option.name, option.kind, option.default
-    if kind is Controller:
-        kind, default = str, "ldvs" if default is MISSING else default
-    elif kind is Geometry:
-        kind, default = Literal[*GEOMETRIES], next(key for key, lines in GEOMETRIES.items() if lines == default)
-    elif name == "observation_time":
-        kind = float | str
-    optional = NoneType in get_args(kind)
-    inner = next(part for part in get_args(kind) if part is not NoneType) if optional else kind
-    several = get_origin(inner) in (tuple, Sequence, Mapping)
-    text = texts.get(name, "")
-    if several:
-        inner = get_args(inner)[0]
-        kind = tuple[inner, ...] | None if optional else tuple[inner, ...]
-        default = default if default is None or default is MISSING else tuple(default)
-    if name == "controller":
-        text = f"{text or 'Controller that plans the walk.'} {'Each is' if several else 'It is'} {CONTROLLER}."
-    choices = "{" + ",".join(map(str, get_args(inner))) + "}" if get_origin(inner) is Literal else None
-    metavar = METAVARS.get(name) or choices or TYPES.get(inner, "")
-    metavar = f"{metavar} ..." if several else metavar
-    hint: Any = {"help_behavior_hint": ""} if default is None or default is False or default == () else {}
-    hint |= {"metavar": f"[{metavar}]" if markers and default is not MISSING else metavar} if metavar else {}
-    described = Annotated[kind, arg(name=name.replace("_", "-"), help=text, **hint), *markers]
-    return name, described, field() if default is MISSING else field(default=default)
-
-
-def _texts(*settings: type) -> dict[str, str]:
-    """Return option -> docstring of its field; if several dataclasses have the field, the last one counts."""
+def _texts(settings: type) -> dict[str, str]:
+    """Return option -> docstring of its field in a dataclass or in one of its base classes."""
     texts: dict[str, str] = {}
-    for source in settings:
-        for base in reversed([base for base in source.__mro__ if is_dataclass(base)]):
-            (tree,) = ast.parse(dedent(getsource(base))).body
-            for statement, text in pairwise(getattr(tree, "body", [])):
-                match statement, text:
-                    case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
-                        texts[NAMES.get(name, name)] = " ".join(words.split())
-    texts.setdefault("initial_velocity", "V_r at the beginning of a walk with --acceleration; by default 0.1.")
-    texts["acceleration"] = (
-        "Acceleration a of Eq. 11 from --initial-velocity to --velocity [1 / time unit]; the paper's is 0.00008."
-        " By default, walks do not accelerate."
-    )
+    for base in reversed([base for base in settings.__mro__ if is_dataclass(base)]):
+        (tree,) = ast.parse(dedent(getsource(base))).body
+        for statement, text in pairwise(getattr(tree, "body", [])):
+            match statement, text:
+                case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
+                    texts[NAMES.get(name, name)] = " ".join(words.split())
     return texts

@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
 from itertools import product
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -118,20 +117,19 @@ def report_checks(findings: Iterable[Any], json: bool, **beside: Any) -> NoRetur
     """Print each finding as soon as its check ends, or one JSON object, and exit: code 0 if all checks pass, else 1.
 
     Args:
-        findings: dataclasses with `name`, `well` (passed) and `found`, and optionally `remedy` and `note`.
+        findings: objects with `name`, `well` (passed) and `found`, and optionally `note`.
         json: whether to print one JSON object instead of lines.
         beside: further members of the JSON object.
     """
     checks = []
     for finding in findings:
-        checks.append(finding)
+        checks.append({"name": finding.name, "well": finding.well, "found": finding.found})
         if not json:
-            remedy = f" Remedy: {finding.remedy}" if getattr(finding, "remedy", "") else ""
             kind = "note " if getattr(finding, "note", False) else "ok   " if finding.well else "WRONG"
-            print(f"{kind}  {finding.name}: {finding.found}{remedy}", flush=True)
-    well = all(finding.well for finding in checks)
+            print(f"{kind}  {finding.name}: {finding.found}", flush=True)
+    well = all(check["well"] for check in checks)
     if json:
         from hexmj.io import json_text
 
-        print(json_text(beside | {"well": well, "checks": [asdict(finding) for finding in checks]}))
+        print(json_text(beside | {"well": well, "checks": checks}))
     sys.exit(0 if well else 1)

@@ -1,12 +1,12 @@
 """`hexmj reproduce` and `hexmj biology`: comparisons with the literature."""
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from hexmj.cli.command import Answer, Command, StudyCommand, at_work
+from hexmj.cli.command import STUDY, Answer, Command, StudyCommand, at_work
 from hexmj.cli.options import Output, Workers, build
 from hexmj.cli.output import lists_of, table
 
@@ -14,19 +14,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@dataclass(frozen=True)
-class ReproduceOptions:
-    """Options of `hexmj reproduce` that `Reproduction` does not have."""
-
-    out: Path = Path("results/reproduce")
-    """Folder for the table (Markdown, JSON), the figures and cached measurements."""
-
-
 class Reproduce(Command):
     """Reproduce Section 5 of the 1998 paper: compare every claim with hexmj's number, and draw Figures 2 to 6, phase
     histograms and footfall diagrams. Repeat the command to resume a stopped run."""
 
-    sources = (ReproduceOptions, "paper.protocol:Reproduction", Output, Workers)
+    sources = ("paper.protocol:Reproduction", Output, Workers)
     examples = ("--quick", "--only hws-close p4 --beside lasting --json")
 
     def run(self, given: SimpleNamespace) -> Answer:
@@ -51,6 +43,7 @@ class Biology(StudyCommand):
     the command to resume a stopped run."""
 
     study = "studies.biology:Biology"
+    sources = (study, *STUDY)
     data = "biology.nc"
     figures = {"biology": "biology"}  # noqa: RUF012
     examples = ("--starts 5", "--controller walknet --vp 120 --out results/walknet")

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from hexmj.cli.command import Answer, StudyCommand
-from hexmj.cli.options import build
+from hexmj.cli.options import Figures, Output, Workers, build
 from hexmj.cli.output import show, table
 from hexmj.validate import distinct
 
@@ -44,8 +44,7 @@ class Task(StudyCommand):
     command to resume a stopped run."""
 
     study = "tasks.runner:TaskStudy"
-    own = (TaskOptions,)
-    planning = ()
+    sources = (TaskOptions, study, Output, Workers, Figures)
     positional = "tasks"
     data = "tasks.nc"
     figures = {}  # noqa: RUF012
@@ -68,8 +67,7 @@ class League(StudyCommand):
     figures. Repeat the command to resume a stopped run."""
 
     study = "tasks.runner:TaskStudy"
-    own = (LeagueOptions,)
-    planning = ()
+    sources = (LeagueOptions, study, Output, Workers, Figures)
     data = "league.nc"
     figures = {"league": "matrix", "cost": "cost"}  # noqa: RUF012
     examples = ("--quick --processes 2", "--controller ldvs mine.py:Mine --tasks curve step")

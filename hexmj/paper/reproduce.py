@@ -181,7 +181,7 @@ def reproduce(
     if not only and protocol.samples != SAMPLES:
         raise InputError(f"samples = {protocol.samples}; expected {SAMPLES}, which the figures need")
     variants = {name: replace(protocol, model_variant=named_variant(name)) for name in beside}
-    out = io.results_folder(out)
+    out = Path(out)
     judged = [claim for key, claim in claims().items() if not only or key in only]
     needed = {name for claim in judged for name in claim.rule.quantity.needs}
     drawn = {} if only else FIGURES
@@ -196,7 +196,7 @@ def reproduce(
     report.files.append(write_text(out / "claims.json", io.json_text(report.json()) + "\n"))
     for name, (_, draw) in drawn.items():
         figure, data = draw(measured.data)
-        path = io.results_folder(out / "figures") / name
+        path = out / "figures" / name
         report.files.extend(io.save_figure(figure, path.with_name(name + end)) for end in (".pdf", ".png"))
         report.files.append(io.save(data, path.with_name(f"{name}.nc")))
     return report

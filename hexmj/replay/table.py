@@ -31,16 +31,8 @@ class Recording(xr.Dataset):
     def to_dataframe(self) -> pd.DataFrame:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the table of all variables over the steps, without those that the recording does not have.
 
-        Each column's name ends with its unit, such as "L1 force z [mN]"; `columns` lists names and meanings. A contact
-        or a stance is True or False. After a fall, poses, forces and measures are NaN.
-
-        Raises:
-            InputError: the recording has no dimension `step`.
-        """
-        return pd.DataFrame({name: values for name, (_, _, values) in self.columns().items()})
-
-    def columns(self) -> dict[str, tuple[str, str, np.ndarray]]:
-        """Return the columns of the table: name -> unit, meaning and values, (step,). A number without unit has "1".
+        Each column's name ends with its unit, such as "L1 force z [mN]". A contact or a stance is True or False. After
+        a fall, poses, forces and measures are NaN.
 
         Raises:
             InputError: the recording has no dimension `step`.
@@ -49,17 +41,15 @@ class Recording(xr.Dataset):
             raise InputError("the recording has no dimension 'step'; select steps with a slice: isel(step=slice(4, 5))")
         data, columns = self, {}
         if "qpos" in self:
-            root, meaning = self["qpos"].values[:, :ROOT_QPOS], {"long_name": "pose of the root in the world"}
             data = self.assign_coords(pose=["x [mm]", "y [mm]", "z [mm]", "qw", "qx", "qy", "qz"])
-            data = data.assign(root=(("step", "pose"), root, meaning))
+            data = data.assign(root=(("step", "pose"), self["qpos"].values[:, :ROOT_QPOS]))
         for variable in (name for name in COLUMNS if name in data.variables):
             values = data[variable].transpose("step", ...)
             for index in np.ndindex(values.shape[1:]):
                 column = values[:, *index]
                 labels = {str(name): label.item() for name, label in column.coords.items() if not label.dims}
-                name = COLUMNS[variable].format(**labels)
-                columns[name] = name.partition("[")[2].rstrip("]") or "1", column.attrs["long_name"], column.values
-        return columns
+                columns[COLUMNS[variable].format(**labels)] = column.values
+        return pd.DataFrame(columns)
 
     def to_csv(self, path: Path | str) -> Path:
         """Write the table as CSV: contacts and stances as 0 or 1, NaN as an empty cell. Return the path.

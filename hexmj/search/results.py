@@ -13,7 +13,7 @@ from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import parameter_file, searched_on
 from hexmj.errors import InputError
 from hexmj.files import read_toml, write_text
-from hexmj.io import results_folder, save, save_figure
+from hexmj.io import save, save_figure
 from hexmj.plain import plain
 from hexmj.plotting import LEGEND, as_shipped, head, in_figure, picture, tidy
 from hexmj.progress import shown
@@ -106,7 +106,7 @@ def run_search(
     problem.domain(effort.domain, effort.beginning)  # raises InputError before a directory is made
     controllers, vectors = _compared(problem)
     judges = Sample(problem, effort.verdict_starts or 0, effort.verdict_seed)
-    out = results_folder(out)
+    out = Path(out)
     judges.settle(threads)  # raises SimulationError before the search
     found = search(problem, effort, folder=out / EVALUATIONS, threads=threads, progress=progress, fresh=fresh)
     history = found.history.assign_attrs(title=title(problem, effort))
