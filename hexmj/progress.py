@@ -25,41 +25,26 @@ def shown(progress: Progress | bool | None, label: str) -> Iterator[Progress | N
         yield progress or None
 
 
-class Bar:
-    """Progress function of a progress bar, which any thread may call.
+@contextmanager
+def progress_bar(label: str) -> Iterator[Progress]:
+    """Show a progress bar during a block, and provide its progress function, which any thread may call.
 
     The clock of the estimate starts with the first progress, so that it leaves out the compilation.
     """
-
-    def __init__(self, bar: Any, label: str) -> None:
-        """Begin with the label of a `tqdm` bar, to which notes are added."""
-        self._bar, self._label, self._note = bar, label, ""
-
-    def __call__(self, done: float) -> None:
-        """Show that a fraction of the work is done."""
-        with self._bar.get_lock():
-            if not self._bar.initial:
-                self._bar.initial, self._bar.start_t, self._bar.delay = done, time.time(), 0.0
-                self._bar.desc = self._label + self._note
-            self._bar.update(min(done, self._bar.total - self._bar.n))
-
-    def note(self, text: str) -> None:
-        """Show a text after the label."""
-        self._note = f", {text}" if text else ""
-        if self._bar.initial:
-            self._bar.desc = self._label + self._note
-
-
-@contextmanager
-def progress_bar(label: str) -> Iterator[Bar]:
-    """Show a progress bar during a block, and provide its progress function."""
     from tqdm import tqdm
 
     screen = sys.stderr.isatty()
     style: Any = {"mininterval": 0.1, "leave": False} if screen else {"mininterval": EVERY, "delay": EVERY}
     style |= {"bar_format": "{desc}: {percentage:.0f} %{bar}{elapsed}, {remaining} left"}
     with tqdm(desc=f"{label} ({COMPILING})", total=1.0, smoothing=0.0, **style) as bar:
-        yield Bar(bar, label)
+
+        def advance(done: float) -> None:
+            with bar.get_lock():
+                if not bar.initial:
+                    bar.initial, bar.start_t, bar.delay, bar.desc = done, time.time(), 0.0, label
+                bar.update(min(done, bar.total - bar.n))
+
+        yield advance
 
 
 def part_of(progress: Progress | None, part: float) -> Progress | None:

@@ -28,7 +28,7 @@ import numpy as np
 from hexmj.errors import InputError, without_extra
 from hexmj.files import read_netcdf, write_netcdf
 from hexmj.plain import digest, plain
-from hexmj.progress import Bar, Progress, part_of, shown
+from hexmj.progress import Progress, part_of, shown
 from hexmj.threads import cores
 from hexmj.validate import whole
 
@@ -113,8 +113,6 @@ class Round(NamedTuple):
     cells: Sequence[Cell]
     left: float = 0.0
     """Estimated work of all later rounds, in the unit of `Cell.work`."""
-    note: str = ""
-    """Text for the progress bar."""
 
 
 def run_study(study: Study, folder: Path | str | None = None, **execution: Unpack[Execution]) -> "xr.Dataset":
@@ -129,8 +127,6 @@ def run_study(study: Study, folder: Path | str | None = None, **execution: Unpac
         while (now := follow(data)).cells:
             work = sum(cell.work for cell in now.cells)
             part = rest * work / (work + now.left)
-            if isinstance(progress, Bar):
-                progress.note(now.note)
             data += run_cells(now.cells, folder, **execution | {"progress": part_of(progress, part)})
             rest -= part
         if progress and rest:

@@ -112,13 +112,12 @@ class Comparison(Study):
         if self.precision is None:
             return Round([])
         samples, chosen = self._sampled(data, self.precision)
-        cells, left, widest = [], 0.0, 0.0
+        cells, left = [], 0.0
         for point, sample, starts in zip(self.points, samples, chosen, strict=True):
             if len(starts):
                 cells.append(self._cell(point, outcome_table, len(starts) / self.n_starts, which=starts))
                 left += cells[-1].work * sample.left(self.narrowed, self.precision) / len(starts)
-                widest = max(widest, sample.half_width(self.narrowed))
-        return Round(cells, left, f"half width {widest:.3f} of {self.precision:g}" if widest else "planning")
+        return Round(cells, left)
 
     def _sampled(
         self, data: Sequence["xr.Dataset"], precision: float

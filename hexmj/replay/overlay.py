@@ -5,23 +5,27 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from PIL import Image, ImageColor, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont
 
 from hexmj.legs import LEGS
 from hexmj.plotting import MEASURE_STYLES
 from hexmj.rendering.scene_marks import CENTRE, STABLE, TIP
 from hexmj.replay.film import Film
 from hexmj.replay.take import Take, margin_in_words
+from hexmj.walks import spans
 
-INK, FAINT, PAPER, SHADE = (24, 26, 28), (120, 124, 126), (250, 250, 247), (222, 222, 217)
+INK, FAINT, PAPER = (24, 26, 28), (120, 124, 126), (250, 250, 247)
 GREEN, RED = (0, 112, 72), (190, 56, 0)
 """Text colours of stable (green) and unstable (red) postures. Their symbols and words differ too."""
 
 MINUS, TIMES = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 
-CAPTION, STRIP, DIAGRAM = 48, 18, 80
-"""Heights on a frame of 640 x 480 pixels, as all sizes in this file. The body's cameras keep these areas free."""
+CAPTION, STRIP, DIAGRAM, BARS = 48, 18, 80, 64
+"""Heights on a frame of 640 x 480 pixels, as all sizes in this file. The body's cameras keep these areas free. `BARS`
+is the part of the diagram above its time axis."""
 
 
 class Overlay:
@@ -36,10 +40,9 @@ class Overlay:
         self._left, self._right = self._pixels(30), width - self._pixels(12)
         lost = f"loss at {1000 * take.lost:.0f} ms" if np.isfinite(take.lost) else "no loss"
         self._loss = f"{'grounded' if take.physical else 'planned'} {lost}"
-        self._swing = ImageColor.getrgb(MEASURE_STYLES["grounded" if take.physical else "kinematic"]["color"])
+        self._swing = MEASURE_STYLES["grounded" if take.physical else "kinematic"]["color"]
         self._legend = self._marks()
-        self._blank = self._axes(width, height - self._bottom)
-        self._full = self._bars(self._blank.copy())
+        self._blank, self._full = (self._diagram(width, height - self._bottom, bars) for bars in (False, True))
 
     def draw(self, frame: np.ndarray, row: int, seconds: float, scale: float) -> None:
         """Draw on a frame that shows the walk.
@@ -54,7 +57,7 @@ class Overlay:
         diagram = frame[self._bottom :]
         diagram[:] = self._blank
         diagram[:, :now] = self._full[:, :now]
-        diagram[: self._row(6), now : now + cursor] = INK
+        diagram[: self._pixels(BARS), now : now + cursor] = INK
         frame[: self._top] = self._caption(frame[: self._top], row, seconds)
         strip = frame[self._bottom - self._pixels(STRIP) : self._bottom]
         strip[:] = self._strip(strip, scale)
@@ -99,14 +102,13 @@ class Overlay:
         title = _shortened(take.title, bold, image.width - 3 * edge - bold.getlength(state))
         draw.text((edge, first), title, INK, bold, "lm")
         draw.text((image.width - edge, first), state, colour, bold, "rm")
-        outside = self._outside(seconds)
         fields = {
             0.0: f"{1000 * seconds:.0f} ms = {seconds * take.conditions.vp:.1f} time units, {self._speed}",
-            0.46: "V = ?" if outside else f"V = {take.velocity[row]:.2f}",
+            0.46: f"V = {take.velocity[row]:.2f}",
             0.565: f"Vₚ = {take.conditions.vp:g} mm/s",
         }
         margin = margin_in_words(take.margin[row]).replace("-", MINUS)
-        last = "margin unknown" if outside else self._loss if seconds >= take.fell else margin
+        last = self._loss if seconds >= take.fell else margin
         draw.text((image.width - edge, second), last, INK, plain, "rm")
         for place, text in fields.items():
             draw.text((edge + place * (image.width - 2 * edge), second), text, INK, plain, "lm")
@@ -117,64 +119,39 @@ class Overlay:
         take, after = self._take, f" ({self._loss})" if seconds >= self._take.lost else ""
         if seconds >= take.fell:
             return f"■ {take.part} touches the ground at {1000 * take.fell:.0f} ms", RED
-        if outside := self._outside(seconds):
-            return outside, FAINT
+        if not take.begin - take.step / 2 <= seconds <= take.end + take.step / 2:  # beside a longer recording
+            return f"recorded from {1000 * take.begin:.0f} to {1000 * take.end:.0f} ms", FAINT
         if take.margin[row] <= 0:
             return "▲ unstable" + after, RED
         return "● stable" + after, GREEN
 
-    def _outside(self, seconds: float) -> str:
-        """Return when the recording begins and ends if the time is outside it, as beside a longer one; else ""."""
-        take = self._take
-        if take.begin - take.step / 2 <= seconds <= take.end + take.step / 2:
-            return ""
-        return f"recorded from {1000 * take.begin:.0f} to {1000 * take.end:.0f} ms"
-
-    def _axes(self, width: int, height: int) -> np.ndarray:
-        """Return the diagram with its labels and without bars, (height, width, 3)."""
-        image = Image.new("RGB", (width, height), PAPER)
-        draw, font, label = ImageDraw.Draw(image), _font(self._pixels(10)), self._left - self._pixels(6)
-        for leg, name in enumerate(LEGS):
-            draw.text((label, (self._row(leg) + self._row(leg + 1)) / 2), name, INK, font, anchor="rm")
-            draw.line((self._left, self._row(leg + 1), self._right, self._row(leg + 1)), SHADE)
-        baseline = (self._row(6) + height) / 2
-        draw.text((label, baseline), "ms", FAINT, font, anchor="rm")
-        for milliseconds in MaxNLocator(11, steps=(1, 2, 5, 10)).tick_values(1000 * self._begin, 1000 * self._end):
-            x = self._column(milliseconds / 1000)
-            if not self._left <= x <= self._right:
-                continue
-            draw.line((x, self._row(6), x, self._row(6) + self._pixels(2)), FAINT)
-            half = draw.textlength(f"{milliseconds:g}", font) / 2
-            if label < x - half and x + half < width:
-                draw.text((x, baseline), f"{milliseconds:g}", FAINT, font, anchor="mm")
-        return np.asarray(image)
-
-    def _bars(self, axes: np.ndarray) -> np.ndarray:
-        """Draw the bars and the line of the first loss of stability on `axes`, and return `axes`."""
-        take = self._take
-        columns = np.arange(self._left, self._right)
-        part = (columns - self._left + 0.5) / (self._right - self._left)
-        seconds = self._begin + part * (self._end - self._begin) - take.begin
-        beyond = (seconds < 0) | (seconds > len(take.qpos) * take.step)
-        steps = np.clip(np.rint(seconds / take.step).astype(int) - 1, 0, len(take.qpos) - 1)
-        gap = self._pixels(1.5)
-        axes[: self._row(6), columns[beyond]] = SHADE
-        for leg in range(6):
-            swing = columns[~take.stance[steps, leg] & ~beyond]
-            axes[self._row(leg) + gap : self._row(leg + 1) - gap + 1, swing] = self._swing
-        if self._begin <= take.lost <= self._end:
-            x = self._column(take.lost)
-            axes[: self._row(6), x : x + self._pixels(1.5)] = RED
-        return axes
+    def _diagram(self, width: int, height: int, bars: bool) -> np.ndarray:
+        """Return the diagram, with or without bars and the line of the first loss, (height, width, 3)."""
+        take, size = self._take, np.array([width, height])
+        figure = Figure(size / 72, dpi=72, facecolor=[part / 255 for part in PAPER])
+        left, right, bottom = self._left / width, self._right / width, 1 - self._pixels(BARS) / height
+        axes = figure.add_axes((left, bottom, right - left, 1 - bottom), facecolor="none", frameon=False)
+        axes.set(xlim=(1000 * self._begin, 1000 * self._end), ylim=(6.0, -0.3), yticks=np.arange(6) + 0.5)
+        axes.set_yticklabels(LEGS)
+        axes.tick_params(labelsize=self._pixels(9), length=self._pixels(2), pad=self._pixels(2), width=self._scale)
+        axes.xaxis.set_major_locator(MaxNLocator(11, steps=(1, 2, 5, 10)))
+        axes.text(-0.01, -0.03, "ms", transform=axes.transAxes, ha="right", va="top", fontsize=self._pixels(9))
+        if bars:
+            time = 1000 * (take.begin + take.step * np.arange(1, len(take.stance) + 1))
+            for leg in range(6):
+                axes.broken_barh(spans(time, ~take.stance[:, leg]), (leg + 0.1, 0.8), color=self._swing)
+            for begin, end in ((self._begin, take.begin), (take.end, self._end)):
+                axes.axvspan(1000 * begin, 1000 * max(begin, end), color="0.85")
+            if np.isfinite(take.lost):
+                axes.axvline(1000 * take.lost, color="#be3200", linewidth=1.5 * self._scale)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def _column(self, seconds: float) -> int:
         """Return the pixel column of a time [s] in the diagram."""
         part = (seconds - self._begin) / (self._end - self._begin)
         return self._left + round(part * (self._right - self._left - 1))
-
-    def _row(self, leg: int) -> int:
-        """Return the first pixel row of a leg's bars in the diagram."""
-        return self._pixels(3 + 10 * leg)
 
     def _pixels(self, size: float) -> int:
         """Convert a length on a frame of 640 x 480 pixels to pixels of this film's frames."""

@@ -80,8 +80,8 @@ MEASURED = {
 }
 """Further variables of the recording of a physical walk. The recording of a plan has none of them."""
 
-OPTIONAL = ("joint_angle", "tip", "dynamic_loss_time", "joint_torque", "ground_force")
-"""Variables that recordings of plans of 0.5.0 do not have; the last two need a walk that keeps forces."""
+OPTIONAL = ("joint_torque", "ground_force")
+"""Variables that only recordings of walks with the option `forces` have."""
 
 
 @dataclass(frozen=True)
@@ -230,24 +230,18 @@ def save_recording(recording: xr.Dataset, path: Path | str) -> Path:
 
 
 def load_recording(path: Path | str) -> Recording:
-    """Read a recording that `save_recording` wrote with this version of hexmj, or a recording of a plan of 0.5.0.
-
-    A recording of 0.5.0 gets its joint angles and tips from `qpos`.
+    """Read a recording that `save_recording` wrote.
 
     Raises:
-        InputError: the file cannot be read, is not a recording, or is a physical walk of 0.5.0.
+        InputError: the file cannot be read or is not a recording.
     """
     loaded = read_netcdf(path)
     check_recording(loaded, f"{path}: ")
-    recording = Recording(loaded.data_vars, loaded.coords, loaded.attrs)
-    old = "tip" not in recording and recording.attrs["body"] == STICK_INSECT.name
-    return _with_pose(recording, recorded_conditions(recording)) if old else recording
+    return Recording(loaded.data_vars, loaded.coords, loaded.attrs)
 
 
 def check_recording(recording: xr.Dataset, where: str = "") -> None:
     """Raise InputError if a variable or an attribute of a recording is missing."""
-    if "measured_margin" in recording:
-        raise InputError(f"{where}a physical walk of hexmj 0.5.0; record the walk again")
     physical = not MEASURED.keys().isdisjoint(recording.variables)
     variables = TIMES | PLANNED | (MEASURED if physical else {})
     attributes = ["title", *Conditions().settings(), *_stride_settings(Stride())]
@@ -283,7 +277,7 @@ def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
     summary: dict[str, Any] = {
         "time units": float(recording.time[-1]),
         "kinematic loss": float(recording.planned_loss_time),
-        "dynamic loss": recording.dynamic_loss_time.item() if "dynamic_loss_time" in recording else None,
+        "dynamic loss": float(recording.dynamic_loss_time),
         "least planned margin [mm]": float(recording.planned_margin.min()),
     }
     if "grounded_margin" not in recording:
@@ -327,9 +321,13 @@ def _dataset(planned: PlannedWalk, conditions: Conditions, stride: Stride, title
         "planned_loss_time": loss_time(planned)[0],
         "dynamic_loss_time": tipped * stride.dt if tipped else np.inf,
     }
-    coordinates = _filled(TIMES, values) | {"leg": list(LEGS), "coordinate": list("xyz")}
+    qpos = values["qpos"]
+    values["joint_angle"] = angles = qpos[:, ROOT_QPOS:]
+    tips = compile_body(conditions).forward(angles.reshape(len(qpos), len(LEGS), -1))
+    values["tip"] = qpos[:, None, :3] + rotated(qpos[:, None, 3:ROOT_QPOS], tips)
+    axes = {"leg": list(LEGS), "coordinate": list("xyz"), "joint": list(conditions.body.joints)}
     attributes = {"title": title, **conditions.settings(), **_stride_settings(stride)}
-    return _with_pose(Recording(_filled(PLANNED | MEASURED, values), coordinates, attributes), conditions)
+    return Recording(_filled(PLANNED | MEASURED, values), _filled(TIMES, values) | axes, attributes)
 
 
 def _filled(table: dict[str, tuple], values: dict[str, np.ndarray]) -> dict[str, tuple]:
@@ -339,16 +337,6 @@ def _filled(table: dict[str, tuple], values: dict[str, np.ndarray]) -> dict[str,
         for name, (dimensions, units, long_name) in table.items()
         if name in values
     }
-
-
-def _with_pose(recording: Recording, conditions: Conditions) -> Recording:
-    """Add joint angles and tips, which follow from `qpos`, and the names of the joints."""
-    qpos = recording["qpos"].values
-    angles = qpos[:, ROOT_QPOS:]
-    tips = compile_body(conditions).forward(angles.reshape(len(qpos), len(LEGS), -1))
-    tips = qpos[:, None, :3] + rotated(qpos[:, None, 3:ROOT_QPOS], tips)
-    named = recording.assign_coords(joint=list(conditions.body.joints))
-    return named.assign(_filled(PLANNED, {"joint_angle": angles, "tip": tips}))
 
 
 def _lifted_tips(planned: PlannedWalk, conditions: Conditions, stride: Stride) -> tuple[np.ndarray, np.ndarray]:

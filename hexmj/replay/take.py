@@ -164,8 +164,7 @@ def walk_figure(recording: xr.Dataset) -> "Figure":
     footfall.set_ylabel("bars: foot off\nthe ground", labelpad=24)
     margin.axhline(0.0, color="0.6", linewidth=0.8)
     margin.plot(time, recording.planned_margin, color=blue, linewidth=1.2, label="planned")
-    events = {"kinematic loss": float(recording.planned_loss_time)}
-    events["dynamic loss"] = float(recording.get("dynamic_loss_time", np.inf))
+    events = {"kinematic loss": float(recording.planned_loss_time), "dynamic loss": float(recording.dynamic_loss_time)}
     if physical:
         known = np.where(np.isfinite(recording.grounded_margin), recording.grounded_margin, np.nan)
         margin.plot(time, known, color=orange, linewidth=1.2, label="grounded: feet at the ground")

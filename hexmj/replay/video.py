@@ -1,7 +1,6 @@
 """Films of recordings: the body, its support polygon, a caption and a footfall diagram."""
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -31,9 +30,6 @@ ENCODINGS: dict[str, dict[str, Any]] = {
 
 AFTER_FALL = 0.25
 """Time for which a film shows a fallen body [s of the walk]."""
-
-GROUND = "ground"
-"""Name of the ground's texture, if the MJCF has one."""
 
 
 def render(
@@ -88,34 +84,25 @@ def render(
 def _frames(
     takes: Sequence[Take], overlays: Sequence[Overlay], times: np.ndarray, film: Film, progress: Progress | None
 ) -> Iterator[np.ndarray]:
-    """Yield frames with the takes side by side at `times` of the walk, (frame,) [s]; a second thread draws overlays."""
+    """Yield frames with the takes side by side at `times` of the walk, (frame,) [s]."""
     rows = 1 if len(takes) <= 3 else 2
     columns = -(-len(takes) // rows)
     picture = np.full((film.height * rows, film.width * columns, 3), 255, dtype=np.uint8)
     panels = [panel for row in np.split(picture, rows) for panel in np.split(row, columns, axis=1)][: len(takes)]
-
-    def drawn(views: Sequence[tuple[np.ndarray, float]], seconds: float) -> np.ndarray:
-        for take, overlay, panel, (view, scale) in zip(takes, overlays, panels, views, strict=True):
-            panel[:] = view
-            overlay.draw(panel, take.row(seconds), seconds, scale)
-        return picture
-
     with ExitStack() as opened:
         stages: dict[Conditions, tuple[gl.Renderer, mujoco.MjData]] = {}
         for conditions in dict.fromkeys(take.conditions for take in takes):
             model = _filmed_body(film, conditions)
             renderer = opened.enter_context(gl.Renderer(model, film.height, film.width))
             stages[conditions] = renderer, mujoco.MjData(model)
-        drawer, frame = opened.enter_context(ThreadPoolExecutor(1)), None
         for seconds in times.tolist():
-            views = [_view(stages[take.conditions], film.camera, take, take.row(seconds)) for take in takes]
-            if frame:
-                yield frame.result()
-            frame = drawer.submit(drawn, views, seconds)
+            for take, overlay, panel in zip(takes, overlays, panels, strict=True):
+                row = take.row(seconds)
+                panel[:], scale = _view(stages[take.conditions], film.camera, take, row)
+                overlay.draw(panel, row, seconds, scale)
+            yield picture
             if progress:
                 progress(1 / len(times))
-        if frame:
-            yield frame.result()
 
 
 def _filmed_body(film: Film, conditions: Conditions) -> mujoco.MjModel:
@@ -124,14 +111,9 @@ def _filmed_body(film: Film, conditions: Conditions) -> mujoco.MjModel:
     model.vis.global_.offwidth, model.vis.global_.offheight = film.width, film.height
     if film.quality == "high":
         model.vis.quality.shadowsize, model.vis.quality.offsamples = 4096, 4
-        return model
-    model.vis.quality.offsamples = 0
-    model.light_castshadow[:] = False
-    if (i := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXTURE, GROUND)) >= 0:
-        ground = model.texture(i)
-        begin = int(ground.adr[0])
-        colours = model.tex_data[begin : begin + int(ground.width[0] * ground.height[0] * ground.nchannel[0])]
-        colours[:] = np.minimum(1.2 * colours, 255)  # MuJoCo renders the ground darker without shadows
+    else:
+        model.vis.quality.offsamples = 0
+        model.light_castshadow[:] = False
     return model
 
 
