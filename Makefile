@@ -61,14 +61,14 @@ results: bench
 	.venv/bin/hexmj league --processes 2
 	for varied in "vp 40 80 160" "centre-of-mass -2 0 2" "standing-height 8 10 12" "landing-time 10 20 40" \
 	    "step-height 4 12" "friction 0.5 1"; do \
-	    .venv/bin/hexmj compare --controller ldvs --velocity 0.5 --starts 400 --no-video --$$varied \
+	    .venv/bin/hexmj compare --controller ldvs --velocity 0.5 --starts 400 --$$varied \
 	        --out results/sensitivity/$${varied%% *} || exit 1; \
 	done
 	.venv/bin/hexmj compare --controller ldvs --velocity 0.3 0.5 0.7 --vp 20 40 80 160 --starts 400 --seed 66 \
-	    --no-video --out results/dynamic
+	    --out results/dynamic
 	.venv/bin/hexmj compare --controller ldvs --velocity 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 --precision 0.03 \
-	    --no-video --out results/over_v
-	.venv/bin/hexmj compare --controller $(LEAGUE) --velocity 0.5 --starts 200 --seed 17 --no-video --processes 2 \
+	    --out results/over_v
+	.venv/bin/hexmj compare --controller $(LEAGUE) --velocity 0.5 --starts 200 --seed 17 --processes 2 \
 	    --out results/everyone
 	.venv/bin/python docs/results.py
 

@@ -35,13 +35,13 @@ from .measures.kinematic import walk as walk
 from .measures.physical import PhysicalWalk as PhysicalWalk
 from .measures.physical import physical_walk as physical_walk
 from .plotting import plot as plot
-from .replay.film import Film as Film
 from .replay.page import page as page
 from .replay.recording import load_recording as load_recording
 from .replay.recording import record as record
 from .replay.recording import record_plan as record_plan
 from .replay.recording import save_recording as save_recording
 from .replay.table import Recording as Recording
+from .replay.video import Film as Film
 from .replay.video import render as render
 from .search.forms import FieldsForm as FieldsForm
 from .search.forms import NetworkForm as NetworkForm

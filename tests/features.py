@@ -332,13 +332,12 @@ FEATURES: dict[str, str | Callable[[], Any]] = {
     "controller learned": f"{FALLS} --controller train_cma.py:REFLEXES",
     "check-controller": "check-controller tripod.py:Tripod",
     "check-controller fails": lambda: answer("check-controller broken.py:Broken", code=1),
-    "compare precise": "compare --controller ldvs --velocity 0.7 --precision 0.2 --vp 80 160 --no-video"
-    " --observation-time 20",
-    "compare steady": "compare --controller graham-random --velocity 0.8 --starts 3 --protocol steady --no-video",
+    "compare precise": "compare --controller ldvs --velocity 0.7 --precision 0.2 --vp 80 160 --observation-time 20",
+    "compare steady": "compare --controller graham-random --velocity 0.8 --starts 3 --protocol steady",
     "compare": lambda: resumed(
         "compare --controller hws tripod.py:Tripod --velocity 0.7 --starts 4 --observation-time 40"
     ),
-    "compare text": lambda: text("compare --velocity 0.6 --starts 3 --observation-time 20 --no-video --out text"),
+    "compare text": lambda: text("compare --velocity 0.6 --starts 3 --observation-time 20 --out text"),
     "render one": lambda: shown(f"render walk.nc {FILM}"),
     "render two": lambda: shown(f"render walk.nc plan.nc {FILM} --camera side"),
     "render GIF": lambda: shown(f"render walk.nc {FILM} --camera top --format gif --quality high"),

@@ -88,7 +88,7 @@ def test_each_point_of_the_axes_equals_a_run_of_its_own(run, tmp_path):
         alone = compare(BOTH, [0.5, 0.6], **FEW, conditions=Conditions(**point))
         part = every.sel(point).drop_vars([*point])
         assert part.assign_attrs(alone.attrs).identical(alone)
-    words = "--velocity 0.5 0.6 --starts 3 --observation-time 10 --vp 320 160 --load 0 0.5 --no-video --json --out"
+    words = "--velocity 0.5 0.6 --starts 3 --observation-time 10 --vp 320 160 --load 0 0.5 --json --out"
     answer = json.loads(run("compare", *words.split(), tmp_path)[1])
     assert answer["vp"] == [320.0, 160.0] and answer["load"] == [0.0, 0.5]
     assert answer["ldvs"]["physical"] == every.physical.sel(controller="ldvs").values.tolist()

@@ -197,7 +197,7 @@ def test_what_cannot_be_drawn_loaded_or_saved_is_an_error(
 @pytest.mark.slow
 @pytest.mark.parametrize("form", few_of(["svg", "png", "pdf"], "png"))
 def test_a_command_draws_what_can_be_drawn_again(form: str, tmp_path: Path) -> None:
-    words = ["compare", "--velocity", "0.5", "--starts", "2", "--observation-time", "10", "--no-video"]
+    words = ["compare", "--velocity", "0.5", "--starts", "2", "--observation-time", "10"]
     words += ["--format", form, "--out", str(tmp_path)]
     subprocess.run([sys.executable, "-m", "hexmj", *words], check=True, capture_output=True)
     drawn = tmp_path / f"comparison.{form}"

@@ -50,7 +50,7 @@ def test_a_failed_check_shows_the_last_line_of_its_error_and_the_others_follow(r
     ("name", "settings", "remedy"),
     [
         ("walking", {"NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator"}, "NUMBA_CACHE_DIR"),
-        ("rendering", {"MUJOCO_GL": "nonsense"}, "MUJOCO_GL"),
+        ("films", {"MUJOCO_GL": "nonsense"}, "Set MUJOCO_GL"),
         ("films", {"IMAGEIO_FFMPEG_EXE": "/nowhere"}, "IMAGEIO_FFMPEG_EXE"),
     ],
 )

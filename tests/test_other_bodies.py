@@ -20,9 +20,8 @@ from hexmj.errors import InputError
 from hexmj.measures.physical import physical_walk
 from hexmj.physics.outcomes import Outcomes
 from hexmj.rendering import gl
-from hexmj.replay.film import Film
 from hexmj.replay.recording import load_recording, record, record_plan, save_recording
-from hexmj.replay.video import render
+from hexmj.replay.video import Film, render
 from hexmj.starts import draw_starts
 from other_bodies import any_hexapod, renamed
 

@@ -1,7 +1,5 @@
 """`hexmj walk`, `hexmj flss` and `hexmj compare`."""
 
-import math
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +10,10 @@ import numpy as np
 
 from hexmj.cli.command import STUDY, Answer, Command, StudyCommand, draw
 from hexmj.cli.options import Figures, Output, Planning, Threads, build, check_kinematic, controller
-from hexmj.cli.output import Column, four_digits, grid, report_line
+from hexmj.cli.output import Column, four_digits, grid, report_line, table
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller
-from hexmj.controllers.wrappers import by_protocol
-from hexmj.errors import InputError, RenderingError
+from hexmj.errors import InputError
 from hexmj.measures.tables import Measure
 
 if TYPE_CHECKING:
@@ -52,9 +49,6 @@ PLAIN = "plain walks: number of walks that random starts would need for an inter
 FREQUENCIES = {"kinematic": "kinematic FLSS", "dynamic": "FLDS", "physical": "frequency of falls"}
 """Measure of `hexmj flss` -> name of its frequency."""
 
-TIMES = ("kinematic loss", "dynamic loss", "grounded loss", "carried loss", "fall")
-"""Entries of a walk's summary that are times [time units]; infinity says that the event does not happen."""
-
 
 @dataclass(frozen=True)
 class WalkOptions:
@@ -72,7 +66,6 @@ class Walk(Command):
     examples = ("--velocity 0.5", "--controller wilson --physical --seed 7 --json")
 
     def run(self, given: SimpleNamespace) -> Answer:
-        from hexmj.measures.compare import REPORTED
         from hexmj.replay.recording import Start, recording_summary, save_recording
 
         if not given.physical:
@@ -83,8 +76,10 @@ class Walk(Command):
         settings = start.settings(**{given.controller: start.controller}) | {"physical": given.physical}
         files = [save_recording(walked, out / "recording.nc"), draw(walked, out / f"walk.{given.format}")]
         summary = recording_summary(walked)
-        lines = [title, *(f"{key}: {_in_words(key, value)}" for key, value in summary.items() if value is not None)]
-        lines += [f"{name}: {walked[name].attrs['long_name']}" for name in REPORTED if given.physical]
+        about = [walked[name].attrs for name in summary]
+        numbers = [four_digits(value) for value in summary.values()]
+        rows = [(name, n, a["units"], a["long_name"]) for name, n, a in zip(summary, numbers, about, strict=True)]
+        lines = [title, table(("outcome", "value", "unit", "meaning"), rows, None)]
         lines += [f"Next: hexmj {command} {files[0]}" for command in ("render", "page", "view")]
         return Answer(summary | {"settings": settings}, lines, files, settings)
 
@@ -171,50 +166,17 @@ def _whole(name: str) -> Column:
     return lambda data: f"{data[name].item():.0f}"
 
 
-@dataclass(frozen=True)
-class CompareOptions:
-    """Options of `hexmj compare` that its study does not have."""
-
-    no_video: bool = False
-    """Write no video."""
-
-
 class Compare(StudyCommand):
     """Compare how often controllers lose static and dynamic stability, in the plan and in the simulation, and fall, on
-    the same starts. Write a table, a figure, NetCDF, a manifest and a gait video. Several values of a condition, as in
-    `--vp 40 80`, are an axis of the result. Repeat the command to resume a stopped run."""
+    the same starts. Write a table, a figure, NetCDF and a manifest. Several values of a condition, as in `--vp 40 80`,
+    are an axis of the result. Repeat the command to resume a stopped run."""
 
     study = "measures.compare:Comparison"
-    sources = (CompareOptions, study, *STUDY)
+    sources = (study, *STUDY)
     defaults = {"controller": ("ldvs", "uncoordinated")}  # noqa: RUF012
     data = "comparison.nc"
     figures = {"comparison": "comparison"}  # noqa: RUF012
-    examples = ("--precision 0.05", "--controller hws wilson --velocity 0.5 --starts 20 --no-video")
-
-    def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
-        """Write a recording and a video of the first controller, at the first value of each axis and near V = 0.3, from
-        a start that stays stable if any."""
-        from hexmj.measures.figures import axes_of
-        from hexmj.replay.recording import Start, save_recording
-        from hexmj.replay.video import render
-
-        if given.no_video:
-            return []
-        name, velocities = str(result.controller.values[0]), result.velocity.values
-        v = float(velocities[np.abs(velocities - 0.3).argmin()])
-        data = result.sel(controller=name, velocity=v).isel(dict.fromkeys(axes_of(result), 0))
-        stable = (np.isinf(data.planned_loss) & np.isinf(data.fall)).values
-        start = int(data.get_index("start")[np.argmax(stable)])
-        begun = by_protocol(controller(given, given.controller[0]), given.protocol)
-        first = build(Start, given, controller=begun, velocity=v, start=start)
-        walked = first.recorded(True, name, given.threads)
-        files = [save_recording(walked, given.out / "recording.nc"), given.out / "gait.mp4"]
-        try:
-            render([walked], files[1], progress=True)
-        except RenderingError as error:
-            print(f"hexmj: no video: {error}", file=sys.stderr)
-            return files[:1]
-        return files
+    examples = ("--precision 0.05", "--controller hws wilson --velocity 0.5 --starts 20")
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         from hexmj.measures.compare import physical_report
@@ -245,10 +207,3 @@ def _speeds(data: "xr.Dataset") -> str:
     """Return minimum and maximum of speed / commanded speed over the starts that did not fall."""
     speed = data.speed.values[np.isinf(data.fall.values)]
     return f"{speed.min():.2f}-{speed.max():.2f}" if np.isfinite(speed).any() else "-"
-
-
-def _in_words(key: str, value: Any) -> str:
-    """Return the value of an entry of a walk's summary as text; `key` is the name of the entry."""
-    if key in TIMES:
-        return f"at {four_digits(value)} time units" if math.isfinite(value) else "none within the walk"
-    return str(value) if not isinstance(value, float) else "-" if math.isnan(value) else four_digits(value)

@@ -25,8 +25,8 @@ class RenderOptions:
     """Options of `hexmj render` that `Start` and `Film` do not have."""
 
     recordings: tuple[Path, ...] = ()
-    """One to six recordings (recording.nc of `hexmj walk`), shown side by side; without a recording, a physical walk is
-    recorded first."""
+    """Recordings (recording.nc of `hexmj walk`), shown side by side; without a recording, a physical walk is recorded
+    first."""
     beside: str | None = None
     """Show beside the walk, from the same start: 'planned' (the plan with its support polygon) or the walk of a second
     controller, given by name."""
@@ -37,17 +37,15 @@ class RenderOptions:
 class Render(Command):
     """Render a video of recordings, or of a physical walk that is recorded first."""
 
-    sources = (RenderOptions, "replay.recording:Start", Output, "replay.film:Film", Planning, Threads)
+    sources = (RenderOptions, "replay.recording:Start", Output, "replay.video:Film", Planning, Threads)
     positional = "recordings"
     examples = ("results/walk/recording.nc --camera side", "--controller wilson --velocity 0.5 --beside planned")
 
     def run(self, given: SimpleNamespace) -> Answer:
-        from hexmj.replay.film import Film
         from hexmj.replay.recording import Start, load_recording, recording_summary, save_recording
-        from hexmj.replay.video import render
+        from hexmj.replay.video import Film, render
 
         film = build(Film, given)
-        film.check_format(given.format)
         shown = [load_recording(path) for path in given.recordings]
         name, settings, files = _file_name(given, [walked.attrs["title"] for walked in shown]), None, list[Path]()
         if not shown:

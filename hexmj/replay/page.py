@@ -56,7 +56,7 @@ def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STI
 
 def page_text(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> str:
     """Return the HTML text that `page` writes for one or two recordings."""
-    takes = takes_of(recordings, body, most=2)
+    takes = takes_of(recordings, body)
     data = [_page_data(recording, take) for recording, take in zip(recordings, takes, strict=True)]
     escapes = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}  # titles cannot end the script
     recordings_json = json.dumps(data, allow_nan=False).translate(str.maketrans(escapes))

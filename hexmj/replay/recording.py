@@ -21,7 +21,6 @@ from hexmj.legs import LEGS
 from hexmj.measures import tables
 from hexmj.measures.compare import REPORTED
 from hexmj.measures.kinematic import walk as planned_walk
-from hexmj.measures.path import path_outcomes, poses_of
 from hexmj.measures.physical import PhysicalWalk, physical_walk
 from hexmj.physics.foot_path import TipTargets, hold
 from hexmj.progress import progress_bar
@@ -119,11 +118,8 @@ class Start:
     def recorded(self, physical: bool, title: str, threads: int | None = None) -> Recording:
         """Return a recording of the physical walk if `physical`, otherwise of the plan."""
         if physical:
-            recording = record(self.walked(threads), title=title)
-        else:
-            plan = self._call(planned_walk, threads=threads)
-            recording = record_plan(plan, self.conditions, self.stride, title=title)
-        return recording if self.command.velocity is not None else recording.assign_attrs(command=self.command.parts[0])
+            return record(self.walked(threads), title=title)
+        return record_plan(self._call(planned_walk, threads=threads), self.conditions, self.stride, title=title)
 
     def _call(self, walk: Callable[..., Any], **options: Any) -> Any:
         """Call `physical_walk` or `planned_walk` with the fields of this start, except its conditions."""
@@ -272,32 +268,9 @@ def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Con
     return Conditions(body=body, **{name: type(value)(recording.attrs[name]) for name, value in defaults.items()})
 
 
-def recording_summary(recording: xr.Dataset) -> dict[str, Any]:
-    """Summarise a recording: times of losses and fall [time units], least margins [mm] and outcomes of the walk."""
-    summary: dict[str, Any] = {
-        "time units": float(recording.time[-1]),
-        "kinematic loss": float(recording.planned_loss_time),
-        "dynamic loss": float(recording.dynamic_loss_time),
-        "least planned margin [mm]": float(recording.planned_margin.min()),
-    }
-    if "grounded_margin" not in recording:
-        return summary
-    part = int(recording.fall_part)
-    summary["grounded loss"] = float(recording.grounded_loss_time)
-    summary["least grounded margin [mm]"] = float(recording.grounded_margin.min())
-    summary["carried loss"] = float(recording.carried_loss_time)
-    if (command := recording.attrs.get("command")) is not None:
-        time, poses = recording.time.values, poses_of(recording.qpos.values[:, None])
-        forward, left, turn = map(float, command)
-        path = path_outcomes(poses, time - time[0], Command(forward, left, turn))
-        summary["distance to the path [mm]"] = path.path_distance.item()
-        summary["heading error [rad]"] = path.heading_error.item()
-    summary["fall"] = float(recording.fall_time)
-    summary["fell on"] = recorded_conditions(recording).body.trunk[part] if part >= 0 else None
-    for name in REPORTED:
-        unit = recording[name].attrs["units"]
-        summary[f"{name} [{unit}]" if unit != "1" else name] = recording[name].item()
-    return summary
+def recording_summary(recording: xr.Dataset) -> dict[str, float]:
+    """Return the variables of a recording that are one number: times of losses and outcomes of the walk."""
+    return {str(name): values.item() for name, values in recording.data_vars.items() if not values.dims}
 
 
 def _stride_settings(stride: Stride) -> dict[str, Any]:

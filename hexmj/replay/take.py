@@ -106,15 +106,14 @@ class Take:
         return support_on_ground(self.conditions, self.feet[row], self.stance[row], self.centre_of_mass[row])
 
 
-def takes_of(recordings: Sequence[xr.Dataset], body: Body, most: int) -> list[Take]:
-    """Read one to `most` recordings of a body.
+def takes_of(recordings: Sequence[xr.Dataset], body: Body) -> list[Take]:
+    """Read recordings of a body.
 
     Raises:
-        InputError: there are too many recordings or none, or `Take.of` cannot read a recording.
+        InputError: there is no recording, or `Take.of` cannot read one.
     """
-    recordings = [recordings] if isinstance(recordings, xr.Dataset) else recordings
-    if not 1 <= len(recordings) <= most:
-        raise InputError(f"{len(recordings)} recordings; expected 1 to {most}")
+    if not len(recordings):
+        raise InputError("no recordings; expected one or more")
     return [Take.of(recording, body) for recording in recordings]
 
 
