@@ -69,8 +69,6 @@ def read_netcdf(path: Path | str) -> "xr.Dataset":
 
     try:
         return xr.load_dataset(path, engine="h5netcdf", decode_times=False)
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read as NetCDF: {error}") from None
 

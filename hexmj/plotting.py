@@ -68,8 +68,6 @@ def plot(result: "xr.Dataset", which: str | None = None) -> "Figure":
     Raises:
         InputError: the dataset has no figure, or no figure with this name.
     """
-    if not hasattr(result, "data_vars"):
-        raise InputError(f"result is a {type(result).__name__}; expected a dataset, such as hexmj.record(walk)")
     study = "recording" if "planned_stance" in result else str(result.attrs.get("study", ""))
     if study not in FIGURES:
         raise InputError(f"study = {study or 'none'}; datasets of these studies have a figure: {', '.join(FIGURES)}")

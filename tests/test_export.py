@@ -81,7 +81,7 @@ def test_a_table_has_a_row_for_each_step(recording, run, tmp_path):
     assert_array_equal(few["L1 force z [mN]"], frame["L1 force z [mN]"][5:9])
     assert "L2 force z [mN]" not in few
     path = hexmj.save_recording(recording, tmp_path / "walk.nc")
-    code, out, _ = run("export", path)
+    code, out, _ = run("export", path, "--out", tmp_path)
     assert code == 0 and "123 columns" in out
     read = pd.read_csv(tmp_path / "walk.csv")
     pd.testing.assert_frame_equal(read, frame, check_dtype=False, check_exact=True)
@@ -90,7 +90,7 @@ def test_a_table_has_a_row_for_each_step(recording, run, tmp_path):
 def test_bad_exports_are_refused(recording, run, tmp_path):
     path = hexmj.save_recording(recording, tmp_path / "walk.nc")
     for words in ((), (path, path), (tmp_path / "absent.nc",)):
-        assert run("export", *words)[0] == 2, words
+        assert run("export", *words, "--out", tmp_path)[0] == 2, words
     with pytest.raises(hexmj.InputError, match="step"):
         recording.isel(step=5).to_dataframe()
     assert [file.name for file in tmp_path.iterdir()] == ["walk.nc"]

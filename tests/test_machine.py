@@ -67,7 +67,7 @@ def test_the_remedy_fits_the_cause(tmp_path, name, settings, remedy):
 def test_a_repeated_command_is_equal_to_the_last_bit(run, tmp_path, words):
     assert run(*words, "--out", tmp_path / "out")[0] == 0
     before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir() if path.is_file()}
-    code, text, _ = run("rerun", tmp_path / "out", "--json", "--threads", 1)
+    code, text, _ = run("rerun", tmp_path / "out", "--json")
     answer = json.loads(text)
     assert code == 0 and answer["equal"] and answer["versions"] == {} and answer["command"][0] == words[0]
     assert before == {path: path.read_bytes() for path in before}

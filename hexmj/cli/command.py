@@ -4,14 +4,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
-from itertools import chain, count
+from itertools import chain
 from pathlib import Path
 from textwrap import fill
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from hexmj.cli.options import Figures, Output, Planning, Workers, build, option_fields, options_class, values_of
-from hexmj.cli.output import lists_of, show
+from hexmj.cli.output import show
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
 STUDY = (Output, Planning, Workers, Figures)
 """Options of most studies."""
-
-MANY = 12
-"""Number of files from which on only their folder is printed."""
 
 
 @dataclass
@@ -89,7 +86,7 @@ class Command:
         if given.json:
             print(json_text({**answer.json, "files": files}))
         else:
-            show(*answer.lines, *(map(str, files) if len(files) < MANY else [f"{len(files)} files in {given.out}"]))
+            show(*answer.lines, *([f"{given.out}: {', '.join(file.name for file in files)}"] if files else []))
 
 
 class StudyCommand(Command):
@@ -99,7 +96,7 @@ class StudyCommand(Command):
     """Place of the study's dataclass, such as "studies.biology:Biology"."""
     data: ClassVar[str]
     """Name of the NetCDF file."""
-    figures: ClassVar[Mapping[str, str]]
+    figures: ClassVar[Mapping[str, str]] = {}
     """File name of a figure without its suffix -> name of the figure for `hexmj.plot`."""
 
     def build(self, given: SimpleNamespace) -> "Study":
@@ -115,7 +112,8 @@ class StudyCommand(Command):
 
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         """Return the JSON answer: by default all variables of the result that have no value for each start."""
-        return lists_of(result.drop_dims("start", errors="ignore"))
+        shown = result.drop_dims("start", errors="ignore")
+        return {str(name): shown[name].values.tolist() for name in shown.variables}
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         """Return the tables and lines that the terminal shows."""
@@ -181,8 +179,5 @@ def settings_line(result: "xr.Dataset", searched: Mapping[str, list[int]]) -> st
     """Return the settings of a result as one line, with a warning if a controller was searched on the same starts."""
     from hexmj.measures.figures import caption
 
-    line = caption(result).replace("$", "").replace("\N{NO-BREAK SPACE}", " ")
-    if searched:
-        seed = next(seed for seed in count(1998) if not any(seed in seeds for seeds in searched.values()))
-        line += f"; {', '.join(searched)}: found by a search on these starts, use fresh starts (--seed {seed})"
-    return line
+    warning = f"; {', '.join(searched)}: found by a search on these starts, use another --seed" if searched else ""
+    return caption(result).replace("$", "").replace("\N{NO-BREAK SPACE}", " ") + warning

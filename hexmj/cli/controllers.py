@@ -8,7 +8,7 @@ from typing import Any
 from hexmj.cli.command import Answer, Command
 from hexmj.cli.measures import DYNAMIC
 from hexmj.cli.options import Figures, Json, Output, Planning, Threads, build, check_kinematic, network_rules
-from hexmj.cli.output import interval, report_checks, table
+from hexmj.cli.output import grid, report_checks, table
 from hexmj.errors import InputError
 from hexmj.timing import Stride
 
@@ -47,17 +47,12 @@ class Search(Command):
         result = run_search(problem, effort, given.out, progress=True, **execution)
         rows = zip(problem.form.names, *result.vectors.values(), strict=True)
         numbers = [(name, *(f"{value:.4g}" for value in values)) for name, *values in rows]
-        verdict, times = result.verdict, result.verdict.observation_time.values.tolist()
-        judged = [
-            (name, *(interval(verdict.sel(controller=name, observation_time=time), "flss") for time in times))
-            for name in verdict.controller.values.tolist()
-        ]
         effort = result.effort
         lines = [
             title(problem, effort),
             table(("parameter", *result.vectors), numbers),
             f"{problem.frequency} on {effort.verdict_starts} fresh starts (seed {effort.verdict_seed}), 95 % intervals",
-            table(("controller", *(f"observation time {time.removesuffix('.0')}" for time in times)), judged),
+            grid(result.verdict, ("controller", "observation_time"), ("flss",)),
             *result.found.report(problem),
         ]
         return Answer(result.summary(), lines, result.files, result.settings)

@@ -10,20 +10,11 @@ from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple
 
 from hexmj.cli.command import Command
 from hexmj.cli.options import Json
 from hexmj.cli.output import report_checks, show
 from hexmj.errors import InputError
-
-
-class Finding(NamedTuple):
-    """Result of one check: what it found, or the error and, if the cause is known, the remedy."""
-
-    name: str
-    well: bool
-    found: str
 
 
 class Doctor(Command):
@@ -37,15 +28,15 @@ class Doctor(Command):
         report_checks(examine(), given.json)
 
 
-def examine() -> Iterator[Finding]:
+def examine() -> Iterator[SimpleNamespace]:
     """Run every check and yield its finding; the last line of the error of a failed check becomes the finding."""
     for check in CHECKS:
         try:
-            yield Finding(check.__name__, True, check())
+            yield SimpleNamespace(name=check.__name__, well=True, found=check())
         except Exception as error:
             found = (str(error) or repr(error)).splitlines()[-1]
             remedies = (f"{found} Remedy: {remedy}" for words, remedy in REMEDIES.items() if words in str(error))
-            yield Finding(check.__name__, False, next(remedies, found))
+            yield SimpleNamespace(name=check.__name__, well=False, found=next(remedies, found))
 
 
 def versions() -> str:
@@ -103,8 +94,6 @@ class RerunOptions:
     result: Path
     """Folder with the results of a command. Relative paths in that command, such as mine.py, are read from the current
     directory."""
-    threads: int | None = None
-    """Number of threads of the repeated command; results do not depend on it."""
 
 
 class Rerun(Command):
@@ -113,7 +102,7 @@ class Rerun(Command):
 
     sources = (RerunOptions, Json)
     positional = "result"
-    examples = ("results/compare", "results/flss --threads 1 --json")
+    examples = ("results/compare", "results/flss --json")
 
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.cli.main import run
@@ -123,10 +112,9 @@ class Rerun(Command):
         names = [name for name in then["files"] if name.endswith(".nc")]
         if not names:
             raise InputError(f"{given.result / MANIFEST} lists no NetCDF file; only NetCDF files can be compared")
-        words = [] if given.threads is None else ["--threads", str(given.threads)]
         with tempfile.TemporaryDirectory(prefix="hexmj-rerun-") as folder:
             with redirect_stdout(StringIO()):
-                run([*then["command"], *words, "--out", folder])
+                run([*then["command"], "--out", folder])
             files = {name: _difference(given.result / name, Path(folder) / name) for name in names}
             now = json.loads((Path(folder) / MANIFEST).read_text(encoding="utf-8"))
         pairs = {name: [then["versions"].get(name), version] for name, version in now["versions"].items()}

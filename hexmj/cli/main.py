@@ -3,7 +3,7 @@
 import os
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hexmj.errors import InputError, RenderingError, SimulationError
 from hexmj.rendering import use_egl_without_display
@@ -103,15 +103,9 @@ def command(name: str) -> "Command":
 
 def _complete(words: list[str]) -> None:
     """Print or write the script with which a shell completes commands and options."""
-    from functools import reduce
-    from operator import or_
-    from typing import Annotated
+    from tyro.extras import subcommand_cli_from_dict
 
-    import tyro
-
-    commands: list[Any] = [Annotated[command(name).options(name), tyro.conf.subcommand(name)] for name in COMMANDS]
-    union: Any = reduce(or_, commands)
-    tyro.cli(union, prog="hexmj", args=words)
+    subcommand_cli_from_dict({name: command(name).options(name) for name in COMMANDS}, prog="hexmj", args=words)
 
 
 def _exit(message: Exception | str, code: int) -> None:

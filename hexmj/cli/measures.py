@@ -6,13 +6,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from hexmj.cli.command import STUDY, Answer, Command, StudyCommand, draw
 from hexmj.cli.options import Figures, Output, Planning, Threads, build, check_kinematic, controller
-from hexmj.cli.output import Column, four_digits, grid, report_line, table
-from hexmj.conditions import Conditions
-from hexmj.controllers.protocol import Controller
+from hexmj.cli.output import four_digits, grid, report_line, table
 from hexmj.errors import InputError
 from hexmj.measures.tables import Measure
 
@@ -26,23 +22,9 @@ FOOT_PATH = ("vp", "step_height", "standing_height", "lift_time", "landing_time"
 DYNAMIC = ("vp", "standing_height")
 """Conditions that also change the dynamic measure."""
 
-EXPLAINED = """\
-t: observation time [time units]
-kinematic: the centre of mass leaves the support polygon of the planned feet
-dynamic: a pendulum on the edge of this polygon tips over (FLDS)
-grounded: it leaves the polygon of the feet at the ground in the simulation
-carried: it leaves the polygon of the feet that carry load in the simulation
-physical: falls, that is, the trunk touches the ground
-
-agree: fraction of starts with both a kinematic loss and a fall, or neither
-agree, FLDS: the same for the dynamic loss and a fall
-speed: walked over commanded, of starts without a fall"""
-"""Lines that explain the tables of `hexmj compare`."""
-
-CASES = "both, kin., phys., none: starts with both, only a loss, only a fall, neither"
-
-WALKS = ("walks", "plain_walks")
-"""Numbers of walks in a result of --precision."""
+AGREE = """\
+agree: fraction of starts with both a kinematic loss and a fall, or neither; dynamic: with a dynamic loss instead
+both, only kinematic, only physical, none: starts with both a kinematic loss and a fall, one of them, or neither"""
 
 PLAIN = "plain walks: number of walks that random starts would need for an interval of this width"
 
@@ -88,7 +70,6 @@ class Walk(Command):
 class FlssOptions:
     """Options of `hexmj flss` that its study does not have."""
 
-    controller: Controller
     n_starts: int | None = None
     """Number of random starts; by default 7000 (seven samples of 1000, as in the paper), or 200 in physical walks."""
     out: Path | None = None
@@ -99,9 +80,6 @@ class FlssOptions:
     precision: float | None = None
     """Half width of the 95 % interval of falls that is enough, such as 0.03, with --measure physical: 20,000 starts are
     planned, and as many walk as the interval needs. By default, all of --starts walk."""
-    range_of: int | None = None
-    """Number of starts that are computed and cached together, by default 1600000; results do not depend on it."""
-    conditions: Conditions = Conditions()
 
 
 class Flss(StudyCommand):
@@ -127,12 +105,6 @@ class Flss(StudyCommand):
         planned = controller(given, given.controller)
         return build(PhysicalFlss, given, controllers={planned.name: planned})
 
-    def result(self, given: SimpleNamespace, study: Any) -> "xr.Dataset":
-        from hexmj.io import attributes
-
-        own = {"model": given.controller, "measure": given.measure}
-        return super().result(given, study).assign_attrs(attributes(own))
-
     def summary(self, result: "xr.Dataset") -> dict[str, Any]:
         from hexmj.measures.compare import physical_report
 
@@ -141,9 +113,11 @@ class Flss(StudyCommand):
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.measures.compare import physical_report
 
-        columns: Any = {name: _four_digits(name) for name in _over_velocity(result) if result[name].notnull().any()}
-        measure = result.attrs["measure"]
-        yield f"{FREQUENCIES[measure]} of {result.attrs['model']}"
+        columns = [
+            str(name) for name, values in result.items() if values.dims == ("velocity",) and values.notnull().any()
+        ]
+        measure = getattr(study, "measure", "physical")
+        yield FREQUENCIES[measure]
         yield grid(result, ("velocity",), columns)
         if "walks" in result:
             yield PLAIN
@@ -151,19 +125,6 @@ class Flss(StudyCommand):
         yield f"low, high: 95 % interval; duration: observation time [time units]{spread}"
         if measure == "physical":
             yield report_line(physical_report(result))
-
-
-def _over_velocity(result: "xr.Dataset") -> list[str]:
-    """Return the names of the variables with one number for each velocity."""
-    return [str(name) for name, values in result.items() if values.dims == ("velocity",)]
-
-
-def _four_digits(name: str) -> Column:
-    return lambda data: four_digits(data[name].item())
-
-
-def _whole(name: str) -> Column:
-    return lambda data: f"{data[name].item():.0f}"
 
 
 class Compare(StudyCommand):
@@ -186,24 +147,13 @@ class Compare(StudyCommand):
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.measures.compare import AGREEMENT, MEASURES, physical_report
         from hexmj.measures.figures import axes_of
+        from hexmj.plotting import MEASURE_STYLES
 
-        axes, names = ("controller", *axes_of(result), "velocity"), ("both", "kin.", "phys.", "none")
-        columns: dict[str, Column] = {"t": lambda data: four_digits(data.duration.item())}
-        answers: dict[str, Column] = {"agree": "agreement", "agree, FLDS": "dynamic_agreement"}
-        if study.precision is None:
-            answers |= zip(names, AGREEMENT, strict=True)
-        else:
-            answers |= {name.replace("_", " "): _whole(name) for name in WALKS}
-        answers["speed"] = _speeds
+        axes = ("controller", *axes_of(result), "velocity")
+        counts = [name for name in (*AGREEMENT, "walks", "plain_walks") if name in result]
         yield "Frequency of losses of stability and of falls, with 95 % intervals"
-        yield grid(result, axes, columns | {name: name for name in MEASURES})
-        yield EXPLAINED
-        yield grid(result, axes, answers)
-        yield CASES if study.precision is None else PLAIN
+        yield grid(result, axes, ("duration", *MEASURES))
+        yield "; ".join(style["label"] for style in MEASURE_STYLES.values())
+        yield grid(result, axes, ("agreement", "dynamic_agreement", *counts))
+        yield AGREE if study.precision is None else PLAIN
         yield report_line(physical_report(result))
-
-
-def _speeds(data: "xr.Dataset") -> str:
-    """Return minimum and maximum of speed / commanded speed over the starts that did not fall."""
-    speed = data.speed.values[np.isinf(data.fall.values)]
-    return f"{speed.min():.2f}-{speed.max():.2f}" if np.isfinite(speed).any() else "-"

@@ -77,19 +77,15 @@ class Threads:
     group: ClassVar[str] = "execution"
 
     threads: int | None = None
-    """Number of threads, by default one per core; results do not depend on it."""
+    """Number of threads of each process, by default one per core; results do not depend on it."""
 
 
 @dataclass(frozen=True)
-class Workers:
+class Workers(Threads):
     """Options of the execution of a study's cells; results do not depend on them."""
 
-    group: ClassVar[str] = "execution"
-
-    threads: int | None = None
-    """Number of threads of each process; by default the processes share the cores equally."""
     processes: int = 1
-    """Number of processes."""
+    """Number of processes; by default they share the cores equally."""
     scheduler: str | None = None
     """Dask scheduler, such as tcp://127.0.0.1:8786; its workers compute and must be able to access the folder --out."""
     fresh: bool = False
@@ -228,7 +224,11 @@ def build(settings: Any, given: SimpleNamespace, **own: Any) -> Any:
             case "controller":
                 values["controller"] = controller(given, given.controller)
             case "controllers":
-                values["controllers"] = controllers(given)
+                distinct("--controller", given.controller)
+                found = [controller(given, name) for name in given.controller]
+                names = [planner.name for planner in found]
+                names = names if len(set(names)) == len(names) else given.controller
+                values["controllers"] = dict(zip(names, found, strict=True))
             case "conditions":
                 values["conditions"] = conditions(given)
             case "axes":
@@ -274,14 +274,6 @@ def network_rules(given: SimpleNamespace) -> dict[str, Any]:
 
         rules["model_variant"] = named_variant(given.model_variant)
     return rules
-
-
-def controllers(given: SimpleNamespace) -> dict[str, Controller]:
-    """Return the controllers of --controller by their attribute `name`, or as typed if two have the same `name`."""
-    distinct("--controller", given.controller)
-    found = [controller(given, name) for name in given.controller]
-    names = [planner.name for planner in found]
-    return dict(zip(names if len(set(names)) == len(names) else given.controller, found, strict=True))
 
 
 def conditions(given: SimpleNamespace) -> Conditions:

@@ -1,7 +1,7 @@
 """Tables, lines and JSON that the commands print."""
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -9,10 +9,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.table import Table
 
-Column = str | Callable[["xr.Dataset"], str]
-"""Column of a table: name of a variable, or a function from the data of a row to the text of its cell."""
-
-HEADS = {"velocity": "V", "vp": "V_p", "leg_mass": "mass", "flss": "FLSS", "flds": "FLDS"}
+HEADS = {"velocity": "V", "vp": "V_p", "duration": "t", "agreement": "agree", "dynamic_agreement": "agree, dynamic"}
+HEADS |= {"leg_mass": "mass", "flss": "FLSS", "flds": "FLDS"}
 """Axis or variable of a result -> its heading in tables, where it is not its name."""
 
 NARROW = 0.05
@@ -65,29 +63,21 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]], repeated: int | No
         yield screen
 
 
-def grid(result: "xr.Dataset", axes: Sequence[str], columns: Mapping[str, Column] | Iterable[str]) -> "Iterator[Table]":
+def grid(result: "xr.Dataset", axes: Sequence[str], columns: Sequence[str]) -> "Iterator[Table]":
     """Yield a table, or parts that fit the screen, with one row for each combination of labels along some axes.
 
     Args:
         result: the data.
         axes: names of the axes; the last axis varies fastest.
-        columns: heading -> column, or names of variables that serve as headings.
+        columns: names of variables; a variable with an interval is shown with it.
     """
-    columns = columns if isinstance(columns, Mapping) else {name: name for name in columns}
     rows = []
     for labels in product(*(result[axis].values.tolist() for axis in axes)):
         data = result.sel(dict(zip(axes, labels, strict=True)))
         names = (f"{label:g}" if isinstance(label, float) else str(label).replace("_", " ") for label in labels)
-        rows.append((*names, *(_text(data, column) for column in columns.values())))
+        cells = (interval(data, c) if f"{c}_low" in data else four_digits(data[c].item()) for c in columns)
+        rows.append((*names, *cells))
     return table((*axes, *columns), rows, len(axes))
-
-
-def _text(data: "xr.Dataset", column: Column) -> str:
-    """Return the text of a cell; if `column` names a variable, its number and, if the data have it, its interval."""
-    if not isinstance(column, str):
-        return column(data)
-    form = "d" if data[column].dtype.kind == "i" else ".3f"
-    return interval(data, column) if f"{column}_low" in data else f"{data[column].item():{form}}"
 
 
 def interval(data: "xr.Dataset", measure: str) -> str:
@@ -101,11 +91,6 @@ def interval(data: "xr.Dataset", measure: str) -> str:
 def four_digits(value: float) -> str:
     """Return a number with four significant digits; a number of 1000 or more is rounded to a whole number."""
     return f"{value:.0f}" if value >= 1000 else f"{value:.4g}"
-
-
-def lists_of(result: "xr.Dataset") -> dict[str, Any]:
-    """Return the coordinates and variables of a result as lists, for the JSON answer."""
-    return {str(name): result[name].values.tolist() for name in result.variables}
 
 
 def report_line(report: dict[str, float]) -> str:

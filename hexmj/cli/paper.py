@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from hexmj.cli.command import STUDY, Answer, Command, StudyCommand, at_work
 from hexmj.cli.options import Output, Workers, build
-from hexmj.cli.output import lists_of, table
+from hexmj.cli.output import table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,9 +30,7 @@ class Reproduce(Command):
         with at_work(given, "reproducing") as execution, as_shipped():
             report = reproduce(given.out, plan.protocol, plan.only, plan.beside, **execution)
         settings = {"protocol": asdict(report.protocol), "only": plan.only, "beside": plan.beside}
-        p = plan.protocol
-        starts = f"The claims of the 1998 paper: FLSS of {p.samples} x {p.sample} starts at each velocity, gaits of"
-        starts += f" {p.gait_starts} starts, walks after obstacles of {p.obstacle_starts} starts; seed {p.seed}"
+        starts = f"{plan.protocol.samples} x {plan.protocol.sample} starts at each velocity; seed {plan.protocol.seed}"
         about = "walk, start: observation times; *: calibrates a constant of hexmj; claims.md: intervals and reasons"
         lines = [starts, table(*report.table(short=True), None), about, *report.summary]
         return Answer(report.json(), lines, report.files, settings)
@@ -47,9 +45,6 @@ class Biology(StudyCommand):
     data = "biology.nc"
     figures = {"biology": "biology"}  # noqa: RUF012
     examples = ("--starts 5", "--controller walknet --vp 120 --out results/walknet")
-
-    def summary(self, result: "xr.Dataset") -> dict[str, Any]:
-        return lists_of(result.drop_dims(("start", "speed", "quantity")))
 
     def shown(self, study: Any, result: "xr.Dataset") -> Iterable[Any]:
         from hexmj.studies.biology import table_rows, walked_in_words

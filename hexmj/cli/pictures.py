@@ -1,7 +1,5 @@
 """`hexmj render`, `hexmj page`, `hexmj export` and `hexmj view`."""
 
-import re
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -46,14 +44,13 @@ class Render(Command):
         from hexmj.replay.video import Film, render
 
         film = build(Film, given)
-        shown = [load_recording(path) for path in given.recordings]
-        name, settings, files = _file_name(given, [walked.attrs["title"] for walked in shown]), None, list[Path]()
+        shown, settings, files = [load_recording(path) for path in given.recordings], None, list[Path]()
         if not shown:
             start = build(Start, given)
             shown = _recorded(start, given)
-            files = [save_recording(walked, given.out / f"{name}-{n}.nc") for n, walked in enumerate(shown, 1)]
+            files = [save_recording(walked, given.out / f"recording-{n}.nc") for n, walked in enumerate(shown, 1)]
             settings = start.settings(**{given.controller: start.controller}) | {"beside": given.beside}
-        files.append(given.out / f"{name}.{given.format}")
+        files.append(given.out / f"film.{given.format}")
         frames = render(shown, files[-1], film, progress=True)
         summary = {"frames": frames, "film": asdict(film), "recordings": [*map(recording_summary, shown)]}
         return Answer(summary, [f"{frames} frames at {film.fps:g} per second"], files, settings)
@@ -64,7 +61,7 @@ def _recorded(start: "Start", given: SimpleNamespace) -> "list[Recording]":
     from hexmj.replay.recording import Start, record, record_plan
 
     second = controller(given, given.beside) if given.beside not in (None, "planned") else None
-    name, walked = start.controller.name, start.walked(given.threads)
+    name, walked = start.controller.name, start.walk(True, given.threads)
     shown = [record(walked, title=name)]
     if given.beside == "planned":
         return [record_plan(walked.planned, start.conditions, start.stride, title=f"{name}, planned"), *shown]
@@ -73,26 +70,19 @@ def _recorded(start: "Start", given: SimpleNamespace) -> "list[Recording]":
     return shown
 
 
-def _file_name(given: SimpleNamespace, titles: Sequence[str]) -> str:
-    """Return the name of the video's file without its suffix, made from the titles of its recordings and the camera."""
-    titles = titles or [f"{given.controller} V {given.velocity:g}", given.beside or ""]
-    words = " beside ".join(filter(None, titles))[:120] + (f" {given.camera}" if given.camera != "following" else "")
-    return re.sub(r"[^A-Za-z0-9.+-]+", "-", words).strip(".-")
-
-
 @dataclass(frozen=True)
-class PageOptions:
-    """Options of `hexmj page`."""
+class Recordings:
+    """Options of `hexmj page` and `hexmj export`."""
 
-    recordings: tuple[Path, ...] = ()
-    """One recording (recording.nc of `hexmj walk`), or two that play side by side at the same time."""
+    recordings: tuple[Path, ...]
+    """One or more recordings (recording.nc of `hexmj walk`). A page plays one, or two side by side at the same time."""
 
 
 class Page(Command):
     """Write one HTML file that plays one recording, or two side by side, in 3D with footfall diagram and stability
     margin. The file works without a network."""
 
-    sources = (PageOptions, Output)
+    sources = (Recordings, Output)
     positional = "recordings"
     examples = ("results/walk/recording.nc", "first/recording.nc second/recording.nc --out results/both")
 
@@ -106,29 +96,18 @@ class Page(Command):
         return Answer({"recordings": [*map(recording_summary, shown)]}, [line], [file])
 
 
-@dataclass(frozen=True)
-class ExportOptions:
-    """Options of `hexmj export`."""
-
-    recordings: tuple[Path, ...]
-    """One or more recordings (recording.nc of `hexmj walk`)."""
-    out: Path | None = None
-    """Folder for the CSV files; by default each file is beside its recording."""
-
-
 class Export(Command):
     """Export recordings as CSV tables with one row for each step of the plan: joint angles and torques, ground forces,
     contacts, tips, stability margins and the pose of the root."""
 
-    sources = (ExportOptions, Output)
-    defaults = {"out": None}  # noqa: RUF012
+    sources = (Recordings, Output)
     positional = "recordings"
     examples = ("results/walk/recording.nc", "first/recording.nc second/recording.nc --json")
 
     def run(self, given: SimpleNamespace) -> Answer:
         from hexmj.replay.recording import load_recording
 
-        files = [(given.out or path.parent) / f"{path.stem}.csv" for path in given.recordings]
+        files = [given.out / f"{path.stem}.csv" for path in given.recordings]
         distinct("CSV files", files)
         lines, tables = [], []
         for path, file in zip(given.recordings, files, strict=True):
@@ -165,11 +144,8 @@ class View(Command):
     def run(self, given: SimpleNamespace) -> None:
         from hexmj.view.desktop import screen
 
-        desktop = screen() and not given.browser
-        if given.recording is None:
-            self.live(given, desktop)
-        else:
-            self.recording(given, desktop)
+        show_it = self.live if given.recording is None else self.recording
+        show_it(given, screen() and not given.browser)
 
     def live(self, given: SimpleNamespace, desktop: bool) -> None:
         """Show an insect that walks until the window is closed or Ctrl-C is pressed."""

@@ -47,7 +47,6 @@ class Task(StudyCommand):
     sources = (TaskOptions, study, Output, Workers, Figures)
     positional = "tasks"
     data = "tasks.nc"
-    figures = {}  # noqa: RUF012
     examples = ("slalom --controller ldvs graham --starts 20", "push mine.toml --controller mine.py:Mine")
 
     def build(self, given: SimpleNamespace) -> Any:

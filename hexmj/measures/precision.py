@@ -134,16 +134,11 @@ class StratifiedWalks:
         missing = np.maximum(self._wanted(narrowed, precision) - self._walked, 0.0).sum()
         return max(0.0, missing - len(self.next_starts(narrowed, precision)))
 
-    def half_width(self, narrowed: Mapping[str, str]) -> float:
-        """Return the largest half width of the measures' intervals; 0 before the first walk."""
-        return max((one.half for one in self._estimates(narrowed)), default=0.0)
-
-    def _estimates(self, narrowed: Mapping[str, str]) -> list[Estimate]:
-        return [self.estimate(np.isfinite(self._times(name))) for name in narrowed.values()] if self.batches else []
-
     def _wanted(self, narrowed: Mapping[str, str], precision: float) -> np.ndarray:
         """Return the number of walks in each stratum, (stratum,), that all measures together need."""
-        estimates = self._estimates(narrowed)
+        estimates = (
+            [self.estimate(np.isfinite(self._times(name))) for name in narrowed.values()] if self.batches else []
+        )
         wide = [one.wanted(precision) for one in estimates if one.half > precision]
         if not estimates:
             return np.full(STRATA, PILOT)

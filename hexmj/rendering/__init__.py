@@ -4,23 +4,16 @@ import ctypes
 import os
 import sys
 
-PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
-"""Packages of Debian and Ubuntu with EGL and a software renderer."""
-
-CHOICES = ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY")
-"""Environment variables that choose an OpenGL library for MuJoCo or name a display."""
-
 
 def use_egl_without_display() -> None:
     """Set MUJOCO_GL=egl in this process if it is unset, there is no display and EGL is installed.
 
     Call it before MuJoCo is imported. Without EGL, the import of MuJoCo would fail with this setting.
     """
-    if sys.platform != "linux" or any(os.environ.get(name) for name in CHOICES):
-        return
-    try:
-        for library in ("libEGL.so.1", "libOpenGL.so.0"):
-            ctypes.CDLL(library)
-    except OSError:
-        return
-    os.environ["MUJOCO_GL"] = "egl"
+    if sys.platform == "linux" and not any(map(os.environ.get, ("MUJOCO_GL", "DISPLAY", "WAYLAND_DISPLAY"))):
+        try:
+            for library in ("libEGL.so.1", "libOpenGL.so.0"):
+                ctypes.CDLL(library)
+        except OSError:
+            return
+        os.environ["MUJOCO_GL"] = "egl"

@@ -6,7 +6,6 @@ import warnings
 import mujoco
 
 from hexmj.errors import RenderingError
-from hexmj.rendering import PACKAGES
 
 
 class Renderer(mujoco.Renderer):
@@ -43,5 +42,5 @@ def missing() -> str | None:
         reason = textwrap.shorten(str(error) or type(error).__name__, 160, placeholder=" [...]").rstrip(".")
     return (
         f"This machine cannot render ({reason}). Without a display, set MUJOCO_GL=egl; on Debian and Ubuntu, EGL needs"
-        f" the packages {PACKAGES}."
+        " the packages libegl1, libgl1-mesa-dri and libopengl0."
     )

@@ -12,6 +12,9 @@ from hexmj.bodies.ground import BUMPS, ground_level
 AROUND, RINGS = 14, 4
 """Number of corners on each ring around a round geom (AROUND), and of rings on each of its two ends (RINGS)."""
 
+FLAT = 1e-3
+"""Height of the ends of a cylinder over its radius."""
+
 UNSET_COLOUR = (0.5, 0.5, 0.5, 1.0)
 """Colour of a geom without a colour of its own."""
 
@@ -104,29 +107,21 @@ def _rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
 
 
 def _round(kind: mujoco.mjtGeom, size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return corners, normals and faces of a solid of revolution: a profile (radius, z) turned about the z axis."""
+    """Return corners, normals and faces of a sphere or an ellipsoid, or of its two halves at a distance.
+
+    The halves of a capsule are hemispheres; those of a cylinder are flat.
+    """
     rise = np.linspace(-np.pi / 2, 0.0, RINGS + 1)
-    if kind == KINDS.mjGEOM_CYLINDER:
-        radius, z = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 0.0]), np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
-        out, up = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0]), np.array([-1.0, -1.0, 0.0, 0.0, 1.0, 1.0])
-        scale, length = (size[0], size[0], size[1]), 0.0
-    else:
-        radius = out = np.concatenate([np.cos(rise), np.cos(rise[::-1])])
-        z = up = np.concatenate([np.sin(rise), -np.sin(rise[::-1])])
-        scale = size if kind == KINDS.mjGEOM_ELLIPSOID else (size[0],) * 3
-        length = size[1] if kind == KINDS.mjGEOM_CAPSULE else 0.0
-    angle = np.linspace(0.0, 2 * np.pi, AROUND + 1)
-
-    def turned(out: np.ndarray, up: np.ndarray) -> np.ndarray:
-        """Turn a profile with radial and z components, (ring,) each, about the z axis, (ring, corner, 3)."""
-        return np.stack(
-            np.broadcast_arrays(np.outer(out, np.cos(angle)), np.outer(out, np.sin(angle)), up[:, None]), -1
-        )
-
-    corners, normals = turned(radius, z) * scale, turned(out, up) / scale
-    corners[..., 2] += np.where(np.arange(len(z)) < len(z) // 2, -length, length)[:, None]
+    rise, angle = np.append(rise, -rise[::-1])[:, None], np.linspace(0.0, 2 * np.pi, AROUND + 1)
+    unit = [np.cos(rise) * np.cos(angle), np.cos(rise) * np.sin(angle), np.sin(rise)]
+    unit = np.stack(np.broadcast_arrays(*unit), axis=-1)
+    flat = FLAT if kind == KINDS.mjGEOM_CYLINDER else 1.0
+    scale = size if kind == KINDS.mjGEOM_ELLIPSOID else size[0] * np.array([1.0, 1.0, flat])
+    corners, normals = unit * scale, unit / scale
+    if kind in (KINDS.mjGEOM_CAPSULE, KINDS.mjGEOM_CYLINDER):
+        corners[..., 2] += np.where(np.arange(len(rise)) <= RINGS, -size[1], size[1])[:, None]
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    return corners.reshape(-1, 3), normals.reshape(-1, 3), _lattice(len(z), len(angle))[:, ::-1]
+    return corners.reshape(-1, 3), normals.reshape(-1, 3), _lattice(len(rise), len(angle))[:, ::-1]
 
 
 def _lattice(rows: int, columns: int) -> np.ndarray:

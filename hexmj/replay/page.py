@@ -14,7 +14,6 @@ import xarray as xr
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions, unusual
-from hexmj.errors import InputError
 from hexmj.files import write_text
 from hexmj.legs import LEGS
 from hexmj.rendering.shapes import body_shapes, ground_shape, joined
@@ -47,10 +46,8 @@ def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STI
         The path.
 
     Raises:
-        InputError: no recording or too many, another suffix, a recording without a pose or of another body.
+        InputError: no recording, or a recording without a pose or of another body.
     """
-    if Path(path).suffix != ".html":
-        raise InputError(f"path = {path}; expected a name with .html")
     return write_text(path, page_text(recordings, body))
 
 
@@ -74,7 +71,6 @@ def _page_data(recording: xr.Dataset, take: Take) -> dict[str, Any]:
     model = compiled.model
     every = max(1, round(POSE_INTERVAL / take.step), -(-len(take.qpos) // MOST_POSES))
     rows = np.unique(np.append(np.arange(0, len(take.qpos), every), len(take.qpos) - 1))
-    poses, tips = _poses(model, body, take.qpos[rows])
     polygons, levels = zip(*(take.support(row) for row in rows), strict=True)
     padded = [np.pad(corners, ((0, 6 - len(corners)), (0, 0)), constant_values=np.nan) for corners in polygons]
     return {
@@ -93,8 +89,8 @@ def _page_data(recording: xr.Dataset, take: Take) -> dict[str, Any]:
         "marks": {"tip": body.marks.tip, "outline": body.marks.outline, "centre": body.marks.rim[0]},
         **_packed_parts(recording, PLANNED),
         "rows": _packed(rows, "i4"),
-        "poses": _packed(poses, "f4"),
-        "tips": _packed(tips, "f4"),
+        "poses": _packed(_poses(model, take.qpos[rows]), "f4"),
+        "tips": _packed(recording["tip"].values[rows], "f4"),
         "planned_tips": _packed(take.planned_tip[rows], "f4"),
         "centre_of_mass": _packed(take.centre_of_mass[rows], "f4"),
         "polygon": _packed(padded, "f4"),
@@ -119,14 +115,13 @@ def _happened(take: Take) -> str:
     return ", ".join(texts) or f"stability {'never lost' if take.lost == np.inf else 'not lost in this part'}"
 
 
-def _poses(model: mujoco.MjModel, body: Body, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions [mm] and quaternions of MuJoCo's bodies, (pose, body, 7), and feet, (pose, leg, 3) [mm]."""
-    data, feet = mujoco.MjData(model), [model.site(foot).id for foot in body.feet]
-    poses, tips = np.empty((len(qpos), model.nbody, 7)), np.empty((len(qpos), 6, 3))
+def _poses(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
+    """Return positions [mm] and quaternions of MuJoCo's bodies, (pose, body, 7)."""
+    data, poses = mujoco.MjData(model), np.empty((len(qpos), model.nbody, 7))
     for n, data.qpos[:] in enumerate(qpos):
         mujoco.mj_kinematics(model, data)
-        poses[n, :, :3], poses[n, :, 3:], tips[n] = data.xpos, data.xquat, data.site_xpos[feet]
-    return poses, tips
+        poses[n, :, :3], poses[n, :, 3:] = data.xpos, data.xquat
+    return poses
 
 
 def _packed(values: Any, kind: str) -> dict[str, Any]:

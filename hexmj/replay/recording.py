@@ -1,6 +1,5 @@
 """Recordings: datasets of the walk from one start, with everything that figures, films and pages need."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -104,30 +103,23 @@ class Start:
     acceleration: Acceleration | None = None
     conditions: Conditions = Conditions()
 
-    @property
-    def command(self) -> Command:
-        """The command of the walk."""
-        return Command(self.velocity, self.left, self.turn)
-
-    def walked(self, threads: int | None = None) -> PhysicalWalk:
-        """Simulate the physical walk and return it."""
+    def walk(self, physical: bool, threads: int | None = None) -> Any:
+        """Return the `PhysicalWalk` if `physical`, otherwise the `PlannedWalk`."""
+        command: Any = Command(self.velocity, self.left, self.turn)
+        straight = command.velocity is not None
+        v = self.velocity if straight else pace(command, self.stride)
+        time = float(observation_duration(self.observation_time, v, self.stride, self.acceleration))
+        settings = draw_start(self.start, self.seed, self.stride), self.controller, v if straight else command, time
+        how = {"stride": self.stride, "acceleration": self.acceleration, "threads": threads}
+        if not physical:
+            return planned_walk(*settings, **how)
         with progress_bar("walking") as progress:
-            how = {"conditions": self.conditions, "forces": True, "progress": progress, "threads": threads}
-            return self._call(physical_walk, **how)
+            return physical_walk(*settings, **how, conditions=self.conditions, forces=True, progress=progress)
 
     def recorded(self, physical: bool, title: str, threads: int | None = None) -> Recording:
         """Return a recording of the physical walk if `physical`, otherwise of the plan."""
-        if physical:
-            return record(self.walked(threads), title=title)
-        return record_plan(self._call(planned_walk, threads=threads), self.conditions, self.stride, title=title)
-
-    def _call(self, walk: Callable[..., Any], **options: Any) -> Any:
-        """Call `physical_walk` or `planned_walk` with the fields of this start, except its conditions."""
-        v = pace(self.command, self.stride) if self.command.velocity is None else self.velocity
-        time = observation_duration(self.observation_time, v, self.stride, self.acceleration)
-        start, options = draw_start(self.start, self.seed, self.stride), {"stride": self.stride} | options
-        command = self.velocity if self.command.velocity is not None else self.command
-        return walk(start, self.controller, command, float(time), acceleration=self.acceleration, **options)
+        walk = self.walk(physical, threads)
+        return record(walk, title=title) if physical else record_plan(walk, self.conditions, self.stride, title=title)
 
     def settings(self, **controllers: Controller) -> dict[str, Any]:
         """Return the settings with which the walk can be repeated, as plain data."""
@@ -239,13 +231,10 @@ def load_recording(path: Path | str) -> Recording:
 def check_recording(recording: xr.Dataset, where: str = "") -> None:
     """Raise InputError if a variable or an attribute of a recording is missing."""
     physical = not MEASURED.keys().isdisjoint(recording.variables)
-    variables = TIMES | PLANNED | (MEASURED if physical else {})
-    attributes = ["title", *Conditions().settings(), *_stride_settings(Stride())]
-    missing = [name for name in variables if name not in {*recording.variables, *OPTIONAL}]
-    missing += [name for name in attributes if name not in recording.attrs]
+    needed = [*TIMES, *PLANNED, *(MEASURED if physical else ()), "title", *Conditions().settings()]
+    missing = [name for name in needed if name not in {*recording.variables, *recording.attrs, *OPTIONAL}]
     if missing:
-        lacks = ", ".join(missing[:3]) + f" and {len(missing) - 3} more" * (len(missing) > 3)
-        raise InputError(f"{where}not a recording, which `hexmj walk` and `hexmj.record` make; it lacks {lacks}")
+        raise InputError(f"{where}not a recording, which `hexmj walk` and `hexmj.record` make; it lacks {missing[0]}")
 
 
 def recorded_conditions(recording: xr.Dataset, body: Body = STICK_INSECT) -> Conditions:

@@ -14,7 +14,6 @@ from hexmj.errors import InputError
 from hexmj.legs import LEGS
 from hexmj.plotting import LEGEND, MEASURE_STYLES, head, in_figure, picture
 from hexmj.replay.recording import check_recording, recorded_conditions
-from hexmj.rotations import heading, turned
 from hexmj.stability import support_polygon
 from hexmj.walks import spans
 
@@ -71,12 +70,9 @@ class Take:
         if poses == 0:
             raise InputError(f"the recording {recording.attrs['title']!r} contains no pose; expected at least one")
         physical = "grounded_stance" in recording
-        kind, tips = ("grounded", "measured") if physical else ("planned", "planned")
+        kind, tip = ("grounded", "tip") if physical else ("planned", "planned_tip")
         shown, vp = recording.isel(step=slice(poses)), conditions.vp
-        centre, qpos = shown["centre_of_mass"].values, shown["qpos"].values
         step = float(recording.attrs["dt"]) / vp
-        ahead = shown[f"{tips}_x"].values + np.tile(recording.attrs["origins"], 2)
-        seen = np.stack([ahead, shown[f"{tips}_y"].values], axis=-1)
         part = int(recording["fall_part"]) if physical else -1
         return cls(
             title=recording.attrs["title"],
@@ -88,10 +84,10 @@ class Take:
             velocity=shown["velocity"].values,
             margin=shown[f"{kind}_margin"].values,
             stance=shown[f"{kind}_stance"].values.astype(bool),
-            feet=centre[:, None, :2] + turned(seen, heading(qpos[:, 3:7])),
+            feet=shown[tip].values[..., :2],
             planned_tip=shown["planned_tip"].values,
-            centre_of_mass=centre,
-            qpos=qpos,
+            centre_of_mass=shown["centre_of_mass"].values,
+            qpos=shown["qpos"].values,
             lost=float(recording[f"{kind}_loss_time"]) / vp,
             fell=float(recording["fall_time"]) / vp if physical else np.inf,
             part=body.trunk[part] if part >= 0 else "",
@@ -153,14 +149,12 @@ def walk_figure(recording: xr.Dataset) -> "Figure":
     stance = recording.grounded_stance.values if physical else planned
     shown = np.isfinite(recording.qpos.values).all(axis=1)  # False after a fall
     blue, orange, red = (MEASURE_STYLES[measure]["color"] for measure in ("kinematic", "grounded", "physical"))
-    for row, leg in enumerate(LEGS):
+    for row in range(6):
         off = spans(time, ~stance[:, row] & shown)
         footfall.broken_barh(off, (row - 0.38, 0.5 if physical else 0.76), color=orange if physical else blue)
         if physical:
             footfall.broken_barh(spans(time, ~planned[:, row]), (row + 0.16, 0.22), color=blue)
-        footfall.text(-0.01, row, leg, transform=footfall.get_yaxis_transform(), ha="right", va="center", fontsize=9)
-    footfall.set(ylim=(5.6, -0.6), yticks=[])
-    footfall.set_ylabel("bars: foot off\nthe ground", labelpad=24)
+    footfall.set(ylim=(5.6, -0.6), yticks=range(6), yticklabels=LEGS, ylabel="bars: foot off\nthe ground")
     margin.axhline(0.0, color="0.6", linewidth=0.8)
     margin.plot(time, recording.planned_margin, color=blue, linewidth=1.2, label="planned")
     events = {"kinematic loss": float(recording.planned_loss_time), "dynamic loss": float(recording.dynamic_loss_time)}

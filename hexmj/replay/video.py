@@ -147,16 +147,11 @@ class Overlay:
         state, colour = self._state(row, seconds)
         draw.text((edge, first), shorten(take.title, 36, placeholder="…"), INK, bold, "lm")
         draw.text((image.width - edge, first), state, colour, bold, "rm")
-        fields = {
-            0.0: f"{1000 * seconds:.0f} ms = {seconds * take.conditions.vp:.1f} time units, {self._speed}",
-            0.46: f"V = {take.velocity[row]:.2f}",
-            0.565: f"Vₚ = {take.conditions.vp:g} mm/s",
-        }
-        margin = margin_in_words(take.margin[row]).replace("-", MINUS)
-        last = self._loss if seconds >= take.fell else margin
-        draw.text((image.width - edge, second), last, INK, plain, "rm")
-        for place, text in fields.items():
-            draw.text((edge + place * (image.width - 2 * edge), second), text, INK, plain, "lm")
+        time = f"{1000 * seconds:.0f} ms = {seconds * take.conditions.vp:.1f} time units, {self._speed}"
+        velocities = f"V = {take.velocity[row]:.2f}, Vₚ = {take.conditions.vp:g} mm/s"
+        margin = self._loss if seconds >= take.fell else margin_in_words(take.margin[row]).replace("-", MINUS)
+        for place, text, anchor in ((0.0, time, "lm"), (0.7, velocities, "rm"), (1.0, margin, "rm")):
+            draw.text((max(edge, place * image.width - edge), second), text, INK, plain, anchor)
         return np.asarray(image)
 
     def _state(self, row: int, seconds: float) -> tuple[str, tuple[int, int, int]]:
