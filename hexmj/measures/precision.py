@@ -136,12 +136,10 @@ class StratifiedWalks:
 
     def _wanted(self, narrowed: Mapping[str, str], precision: float) -> np.ndarray:
         """Return the number of walks in each stratum, (stratum,), that all measures together need."""
-        estimates = (
-            [self.estimate(np.isfinite(self._times(name))) for name in narrowed.values()] if self.batches else []
-        )
-        wide = [one.wanted(precision) for one in estimates if one.half > precision]
-        if not estimates:
+        if not self.batches:
             return np.full(STRATA, PILOT)
+        estimates = [self.estimate(np.isfinite(self._times(name))) for name in narrowed.values()]
+        wide = [one.wanted(precision) for one in estimates if one.half > precision]
         return np.max(wide, axis=0) if wide else np.zeros(STRATA)
 
     def table(self, narrowed: Mapping[str, str]) -> "xr.Dataset":
