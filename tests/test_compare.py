@@ -91,7 +91,7 @@ def test_each_point_of_the_axes_equals_a_run_of_its_own(run, tmp_path):
     words = "--velocity 0.5 0.6 --starts 3 --observation-time 10 --vp 320 160 --load 0 0.5 --json --out"
     answer = json.loads(run("compare", *words.split(), tmp_path)[1])
     assert answer["vp"] == [320.0, 160.0] and answer["load"] == [0.0, 0.5]
-    assert answer["ldvs"]["physical"] == every.physical.sel(controller="ldvs").values.tolist()
+    assert answer["physical"] == every.physical.values.tolist()
 
 
 TURN = Task("turn", Command(0.0, turn=0.01), duration=30.0)
