@@ -102,7 +102,7 @@ class Export(Command):
 
     sources = (Recordings, Output)
     positional = "recordings"
-    examples = ("results/walk/recording.nc", "first/recording.nc second/recording.nc --json")
+    examples = ("results/walk/recording.nc", "first.nc second.nc --out tables")
 
     def run(self, given: SimpleNamespace) -> Answer:
         from hexmj.replay.recording import load_recording
