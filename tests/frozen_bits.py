@@ -167,7 +167,7 @@ def reproduced(seed: int) -> Arrays:
 
     small = Protocol(samples=1, sample=50, velocities=(0.85,), gait_starts=3, gait_velocities=(0.8,), seed=seed)
     out = {}
-    for name in ("hws", "ideal", "ldvs late", "hws regimes", "ldvs footfall"):
+    for name in ("hws", "ideal", "ldvs late", "hws regimes"):
         one = MEASUREMENTS[name]
         measured = one.function(0.85, seed=small.seed, **one.settings(0.85, small))
         out |= {f"{name} {key}": value for key, value in _table(measured).items()}

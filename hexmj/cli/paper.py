@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 
 class Reproduce(Command):
-    """Reproduce Section 5 of the 1998 paper: compare every claim with hexmj's number, and draw Figures 2 to 6, phase
-    histograms and footfall diagrams. Repeat the command to resume a stopped run."""
+    """Reproduce Section 5 of the 1998 paper: compare every claim with hexmj's number, and draw Figures 2 to 6. Repeat
+    the command to resume a stopped run."""
 
     sources = ("paper.protocol:Reproduction", Output, Workers)
     examples = ("--quick", "--only hws-close p4 --beside lasting --json")

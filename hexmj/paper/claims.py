@@ -40,20 +40,9 @@ class Rule:
     quantity: Quantity
     velocities: tuple[float, float]
 
-    @property
-    def words(self) -> str:
-        """The rule in words, for the table of claims."""
-        raise NotImplementedError
-
     def judged(self, points: list[Point]) -> Answer:
         """Return the answer of the rule to the points in its range of velocities."""
         raise NotImplementedError
-
-    @property
-    def span(self) -> str:
-        """Text of the velocities, such as 'V in [0.1, 0.3]'."""
-        low, high = self.velocities
-        return f"V = {low:g}" if low == high else f"V in [{low:g}, {high:g}]"
 
     def answer(self, measured: Measured, observation_time: str) -> Answer | None:
         """Return the answer of the rule to measurements; None if a weight set has not been searched yet."""
@@ -75,23 +64,6 @@ class Band(Rule):
     over: Literal["each", "mean", "changes"] = "each"
     """What the rule judges: the value at each velocity; the mean over the range, J_N of Eq. 10 on a grid of velocities;
     or the changes from each velocity to the next (least = 0: they must rise, most = 0: they must fall)."""
-
-    @property
-    def words(self) -> str:
-        """The rule in words, for the table of claims."""
-        if self.over == "changes":
-            change = f"from each V to the next, over {self.span}, the 95 % interval of the change of"
-            return f"{change} {self.quantity.words} reaches {'above' if self.least == 0 else 'below'} 0"
-        if self.least == self.most:
-            band = f"reaches {self.least:g}"
-        elif np.isinf(self.least):
-            band = f"does not lie above {self.most:g}"
-        elif np.isinf(self.most):
-            band = f"does not lie below {self.least:g}"
-        else:
-            band = f"reaches into [{self.least:g}, {self.most:g}]"
-        at = f"averaged over {self.span}," if self.over == "mean" else f"at {self.span}"
-        return f"{at} the 95 % interval of {self.quantity.words} {band}"
 
     def judged(self, points: list[Point]) -> Answer:
         """Return the answer to the points, their mean or their changes, as `over` says."""
@@ -118,14 +90,6 @@ class Seen(Rule):
     """Number of the paper's starts in which the event of the quantity occurred."""
     of: int
     """Number of all starts in the paper's sample."""
-
-    @property
-    def words(self) -> str:
-        """The rule in words, for the table of claims."""
-        return (
-            f"at {self.span} Fisher's test finds no difference between {self.quantity.words} and {self.count} of"
-            f" {self.of} starts, the paper's own sample (p >= {LEVEL:g})"
-        )
 
     def judged(self, points: list[Point]) -> Answer:
         """Return the answer to the counts of our starts."""
@@ -169,6 +133,8 @@ class Claim:
     rule: Rule
     calibrates: tuple[str, ...] = ()
     why: str = ""
+    judged_by: str = ""
+    """Quantity and rule with their fields, as text."""
 
     @property
     def kind(self) -> str:
@@ -195,6 +161,12 @@ def in_physics() -> list[dict[str, str]]:
 
 def _read(entry: dict[str, Any]) -> Claim:
     quantity, rule, calibrates = entry.pop("quantity"), entry.pop("rule"), tuple(entry.pop("calibrates", ()))
+    judged_by = f"{_text(**quantity)}; {_text(**rule)}"
     measured = QUANTITIES[quantity.pop("kind")](**quantity)
     judge = RULES[rule.pop("kind")](measured, tuple(rule.pop("velocities")), **rule)
-    return Claim(**entry, rule=judge, calibrates=calibrates)
+    return Claim(**entry, rule=judge, calibrates=calibrates, judged_by=judged_by)
+
+
+def _text(kind: str, **members: Any) -> str:
+    """Return a quantity or rule of `claims.toml` as text, such as "losses: curve = hws"."""
+    return f"{kind}: {', '.join(f'{name} = {value}' for name, value in members.items())}"

@@ -1,4 +1,4 @@
-"""Measurements at one velocity: losses of stability, also after obstacles, steady-state gaits, and footfalls.
+"""Measurements at one velocity: losses of stability, also after obstacles, and steady-state gaits.
 
 Results hold every single start, so that curves can be compared on the same starts and divided into samples later.
 All functions take the velocity V_r as a fraction of V_p, the seed and the number of the starts, the stride, the
@@ -29,9 +29,6 @@ NO_SET = -1
 
 LATE_PERIODS = 5
 """Number of periods of a single leg, (AEP_0 - PEP_0) (1 + 1/V), before late losses count (Section 5.2)."""
-
-MOMENTS = 1201
-"""Number of equidistant times at which a footfall diagram shows the stance."""
 
 Answer = Literal["none", "positions", "postures", "slow down"]
 """Response to an obstacle (Section 6). 'positions': the tips go to the nearest posture of an undisturbed walk, and all
@@ -101,33 +98,6 @@ def limit_regimes(
             "lost": ("start", np.isfinite(times), {"long_name": "static stability lost on the way"}),
         },
         {"pair": list(PAIRS), "leg": list(LEGS)},
-    )
-
-
-def footfalls(
-    velocity: float,
-    controller: Cruse1998,
-    seed: int,
-    stride: Stride,
-    acceleration: Acceleration,
-    threads: int | None = None,
-) -> "xr.Dataset":
-    """Return the stance, (time, leg), of one start in its steady-state gait, over three periods of a single leg.
-
-    The unit of time is this period.
-    """
-    import xarray as xr
-
-    start, period = draw_starts(1, seed, stride), stride.periods(velocity)
-    plan = begin(controller, start, velocity, stride, acceleration, threads)
-    settled = int(steps_within(acceleration.duration(velocity) + 10 * period, stride))
-    while plan.done < settled:
-        plan.advance(min(20_000, settled - plan.done))
-    seen = plan.advance(int(steps_within(3 * period, stride))).stance[:, 0]
-    time = np.linspace(0, 3, MOMENTS)
-    return xr.Dataset(
-        {"stance": (("time", "leg"), seen[np.round(time / 3 * (len(seen) - 1)).astype(int)])},
-        {"time": ("time", time, {"units": "periods of a single leg"}), "leg": list(LEGS)},
     )
 
 

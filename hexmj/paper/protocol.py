@@ -8,17 +8,11 @@ from typing import Any
 
 from hexmj.controllers.cruse1998 import MODEL_VARIANTS, PRESETS, Cruse1998, ModelVariant, Order, Symmetric
 from hexmj.files import read_toml
-from hexmj.paper.measurements import footfalls, limit_regimes, losses, losses_after
+from hexmj.paper.measurements import limit_regimes, losses, losses_after
 from hexmj.starts import MOST_STARTS, SAMPLE, checked_list
 from hexmj.sweep import Cell
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
 from hexmj.validate import whole
-
-OVERHEAD = 20
-"""Number of starts whose steps take about as long as the overhead of a step."""
-
-FILE = 0.03
-"""Time in which the file of a cell is written and read [s]."""
 
 PRINTED = MODEL_VARIANTS["printed"]  # the rules as the paper prints them
 
@@ -69,8 +63,6 @@ class Protocol:
     """Number of starts for the gaits of Section 5.3, at each velocity."""
     gait_velocities: tuple[float, ...] = tuple(round(0.05 * n, 2) for n in range(2, 20))
     """Velocities of Figs. 5 and 6, 0.1 to 0.95 [V_p]."""
-    footfall_velocities: tuple[float, ...] = (0.1, 0.3, 0.5, 0.7, 0.9)
-    """Velocities of the footfall diagrams [V_p]."""
     obstacle_velocities: tuple[float, ...] = (0.3, 0.5, 0.7)
     """Velocities of the walks that meet an obstacle (Section 6) [V_p]."""
     obstacle_starts: int = 400
@@ -89,7 +81,7 @@ class Protocol:
     """Model variant of all networks."""
 
     def __post_init__(self) -> None:
-        for name in ("velocities", "gait_velocities", "footfall_velocities", "obstacle_velocities"):
+        for name in ("velocities", "gait_velocities", "obstacle_velocities"):
             checked_list(getattr(self, name))
         for name in ("samples", "sample", "gait_starts", "obstacle_starts"):
             whole(name, getattr(self, name), 1, MOST_STARTS)
@@ -153,13 +145,13 @@ class Measurement:
     """A function that measures at one velocity, its further arguments, and the velocities at which it is called."""
 
     function: Callable[..., Any]
-    """Function: `losses` (Figs. 2-4), `limit_regimes` (Figs. 5, 6), `footfalls` or `losses_after` (Section 6)."""
+    """Function: `losses` (Figs. 2-4), `limit_regimes` (Figs. 5, 6) or `losses_after` (Section 6)."""
     at: str
     """Name of the field of `Protocol` that holds the velocities."""
     preset: str
     """Name of the network, see `Protocol.network`."""
     seconds: float = 1.0
-    """Computing time at all velocities of `FULL` on two cores, for the progress bar [s]."""
+    """Computing time at all velocities of `FULL` on two cores [s], the work of its cells."""
     accelerated: bool = False
     """Whether walks accelerate by Eq. 11."""
     own: Mapping[str, Any] = field(default_factory=dict)
@@ -168,18 +160,17 @@ class Measurement:
     def settings(self, velocity: float, protocol: Protocol) -> dict[str, Any]:
         """Return all arguments of the function except velocity and seed."""
         networks = [protocol.network(self.preset, time, velocity) for time in OBSERVATION_TIMES]
-        planned: dict[str, Any] = {"sets": tuple(networks)} if self.function is losses else {"controller": networks[0]}
         starts: dict[Any, int] = {losses: protocol.samples * protocol.sample, limit_regimes: protocol.gait_starts}
-        starts |= {losses_after: protocol.obstacle_starts}
-        planned |= {"n_starts": starts[self.function]} if self.function in starts else {}
-        stride = protocol.gait_stride if self.at == "gait_velocities" else protocol.stride
-        procedure = protocol.acceleration if self.accelerated else None
-        return planned | {"stride": stride, "acceleration": procedure} | dict(self.own)
+        return {
+            **({"sets": tuple(networks)} if self.function is losses else {"controller": networks[0]}),
+            "n_starts": starts.get(self.function, protocol.obstacle_starts),
+            "stride": protocol.gait_stride if self.at == "gait_velocities" else protocol.stride,
+            "acceleration": protocol.acceleration if self.accelerated else None,
+            **self.own,
+        }
 
 
 _losses = partial(Measurement, losses, "velocities")
-_gaits = partial(Measurement, limit_regimes, "gait_velocities", accelerated=True)
-_footfalls = partial(Measurement, footfalls, "footfall_velocities", accelerated=True)
 _obstacles = partial(Measurement, losses_after, "obstacle_velocities", "ldvs")
 
 MEASUREMENTS: dict[str, Measurement] = {
@@ -187,8 +178,7 @@ MEASUREMENTS: dict[str, Measurement] = {
     **{f"{name} late": _losses(name, 5.0, own={"late": True}) for name in ("hws", "ldvs", "ideal", "own")},
     **{f"{name} accelerated": _losses(name, 25.0, accelerated=True) for name in ("hws", "ldvs")},
     **{f"{name} regimes": Measurement(limit_regimes, "velocities", name, 7.0) for name in ("hws", "ldvs")},
-    **{f"{name} gaits": _gaits(name, 80.0) for name in ("hws", "ldvs")},
-    **{f"{name} footfall": _footfalls(name) for name in ("hws", "ldvs")},
+    **{f"{name} gaits": Measurement(limit_regimes, "gait_velocities", name, 80.0, True) for name in ("hws", "ldvs")},
     "ldvs halted": _obstacles(own={"answer": "none"}),
     "ldvs halted, positions": _obstacles(4.0, own={"answer": "positions"}),
     "ldvs halted, postures": _obstacles(4.0, own={"answer": "postures"}),
@@ -199,14 +189,9 @@ MEASUREMENTS: dict[str, Measurement] = {
 
 def cells(name: str, protocol: Protocol) -> dict[float, Cell]:
     """Return the cell (see `sweep.Cell`) of a measurement at each of its velocities, by velocity."""
-    measurement = MEASUREMENTS[name]
-    velocities: tuple[float, ...] = getattr(protocol, measurement.at)
-    seconds = measurement.seconds / len(getattr(FULL, measurement.at))
-
-    def cell(v: float) -> Cell:
-        own, full = (measurement.settings(v, each) for each in (protocol, FULL))
-        effort, most = ((each.get("n_starts", 1) + OVERHEAD) / each["stride"].dt for each in (own, full))
-        settings = {"velocity": v, "seed": protocol.seed} | own
-        return Cell(f"{name} {v:g}", measurement.function, settings, seconds * effort / most + FILE)
-
-    return {v: cell(v) for v in velocities}
+    measurement, found = MEASUREMENTS[name], {}
+    for v in getattr(protocol, measurement.at):
+        settings = {"velocity": v, "seed": protocol.seed} | measurement.settings(v, protocol)
+        work = measurement.seconds / len(getattr(FULL, measurement.at))
+        found[v] = Cell(f"{name} {v:g}", measurement.function, settings, work)
+    return found

@@ -77,14 +77,6 @@ class Losses:
     """Whether the quantity depends on the observation time."""
 
     @property
-    def words(self) -> str:
-        """Text of the quantity, such as 'FLSS(ldvs) - FLSS(hws)'."""
-        if self.minus is None:
-            return f"FLSS({self.curve})"
-        other = self.minus if self.at is None else f"{self.minus} at V = {self.at:g}"
-        return f"FLSS({self.curve}) - {f'{self.times:g} ' if self.times != 1 else ''}FLSS({other})"
-
-    @property
     def needs(self) -> tuple[str, ...]:
         """Names of the measurements that the quantity needs."""
         return (self.curve,) if self.minus is None else (self.curve, self.minus)
@@ -113,11 +105,6 @@ class Gaits:
     windowed = False
 
     @property
-    def words(self) -> str:
-        """Text of the quantity, such as 'ipsilateral phase(hws)'."""
-        return f"{self.what}({self.model})" + (" - 1/(1 + V)" if self.minus_wilson else "")
-
-    @property
     def needs(self) -> tuple[str, ...]:
         """Name of the measurement that the quantity needs, in a tuple."""
         return (f"{self.model} {PROPERTIES[self.what][0]}",)
@@ -139,11 +126,6 @@ class Weight:
     over: str | None = None
     windowed = True
     needs: tuple[str, ...] = ()
-
-    @property
-    def words(self) -> str:
-        """Text of the quantity, such as 'p2 of ideal sets'."""
-        return f"|{self.parameter} / {self.over}| of the ideal sets" if self.over else f"{self.parameter} of ideal sets"
 
     def points(self, measured: Measured, observation_time: str) -> Iterator[Point]:
         """Yield a point for each ideal set that was found for the observation time and model variant."""

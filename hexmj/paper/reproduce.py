@@ -14,7 +14,7 @@ from hexmj.files import write_text
 from hexmj.measures.tables import VELOCITY
 from hexmj.paper.claims import Answer, Claim, claims, in_physics
 from hexmj.paper.figures import FIGURES, SAMPLES
-from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, Reproduction, cells, searched_seeds
+from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells, searched_seeds
 from hexmj.paper.quantities import Measured
 from hexmj.progress import part_of, shown
 from hexmj.sweep import Execution, over_axes, run_cells
@@ -55,25 +55,19 @@ class Row:
         """Known reason for a difference; '' if every answer agrees."""
         return self.claim.why if "differs" in map(verdict, self.answers.values()) else ""
 
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Texts of the row: claim, answers for all variants and observation times, `fits` and `why`."""
-        claim = self.claim
-        kind = ": ".join(filter(None, (claim.kind, "; ".join(claim.calibrates))))
-        return claim.section, claim.text, claim.value, kind, *self._answered(), self.fits, self.why
+    def texts(self, short: bool = False) -> tuple[str, ...]:
+        """Return the texts of the row in the table of claims; a short row has no kind, interval, place and reason.
 
-    @property
-    def short(self) -> tuple[str, ...]:
-        """Texts of a row for a screen: without intervals, places and reasons; * marks a calibrated claim."""
-        claim = self.claim
-        return claim.section, claim.text + "*" * bool(claim.calibrates), claim.value, *self._answered(short=True)
-
-    def _answered(self, short: bool = False) -> list[str]:
-        """Return the texts of the answers for all variants and observation times."""
-        cells = []
+        A short row marks a calibrated claim with *.
+        """
+        claim, answered = self.claim, []
         for answers in (self.answers, *self.beside.values()):
-            cells += [*(_cell(answer, short) for answer in answers.values()), "same"][: len(OBSERVATION_TIMES)]
-        return cells
+            texts = [_text(answer, short) for answer in answers.values()]
+            answered += [*texts, "same"][: len(OBSERVATION_TIMES)]
+        if short:
+            return claim.section, claim.text + "*" * bool(claim.calibrates), claim.value, *answered
+        kind = ": ".join(filter(None, (claim.kind, "; ".join(claim.calibrates))))
+        return claim.key, claim.section, claim.text, claim.value, kind, *answered, self.fits, self.why
 
 
 def verdict(answer: Answer | None) -> str:
@@ -81,7 +75,7 @@ def verdict(answer: Answer | None) -> str:
     return NOT_SEARCHED if answer is None else "agrees" if answer.agrees else "differs"
 
 
-def _cell(answer: Answer | None, short: bool) -> str:
+def _text(answer: Answer | None, short: bool) -> str:
     """Return the text of an answer: verdict and value; unless it is short, also the 95 % interval and where."""
     if answer is None:
         return NOT_SEARCHED
@@ -100,11 +94,12 @@ class Report:
 
     def table(self, short: bool = False) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Return the column heads and the rows of the table of claims, with a column for each model variant."""
-        answers = [f"{name}, {time}" for name in ("ours", *self.rows[0].beside) for time in OBSERVATION_TIMES]
+        heads = tuple(f"{name}, {time}" for name in ("ours", *self.rows[0].beside) for time in OBSERVATION_TIMES)
         if short:
-            heads = "section", "the paper", "value", *(name.removeprefix("ours, ") for name in answers)
-            return heads, [row.short for row in self.rows]
-        return ("section", "the paper", "its value", "kind", *answers, "fits", "why"), [row.cells for row in self.rows]
+            heads = ("section", "the paper", "value", *(name.removeprefix("ours, ") for name in heads))
+        else:
+            heads = ("key", "section", "the paper", "its value", "kind", *heads, "fits", "why")
+        return heads, [row.texts(short) for row in self.rows]
 
     @property
     def summary(self) -> list[str]:
@@ -118,41 +113,45 @@ class Report:
         return lines
 
     def markdown(self) -> str:
-        """Return a Markdown document: the table, and for every claim its rule and the command that recomputes it."""
+        """Return a Markdown document: the table, the rule of every claim, and what only physical walks can check."""
         p, (heads, rows) = self.protocol, self.table()
         size = f"{p.samples} times {p.sample} starts, gaits from {p.gait_starts} starts"
-        head = f"{size}; seed {p.seed}.  An answer is the value that is farthest from agreeing with the rule,"
         rows = [[cell.replace("differs:", "**differs**:") for cell in row] for row in rows]
-        rules = [(row.claim.text, row.claim.rule.words, f"`{self.command(row)}`") for row in self.rows]
+        rules = [(row.claim.key, row.claim.judged_by) for row in self.rows]
+        physical = [f"- {row['topic']} (Section 6): {row['text']}; `{row['command']}`" for row in in_physics()]
         lines = [
-            "# The claims of the 1998 paper", "", f"{head} its 95 % interval and where it occurs.", "",
-            *(f"- {sentence}" for sentence in self.summary), "",
-            *io.markdown_table(heads, rows), "", "## Rules and commands", "",
-            *io.markdown_table(("the paper", "agrees if", "command"), rules), "",
-            "## Judged in physics", "", "Kinematic walks cannot check these statements: see docs/results/paper.md.", "",
-            *(f"- {row['topic']} (Section 6): {row['text']}; `{row['command']}`" for row in in_physics()),
-        ]  # fmt: skip
+            "# The claims of the 1998 paper",
+            "",
+            f"{size}; seed {p.seed}.  An answer is the value that is farthest from agreeing with the rule, its 95 %",
+            "interval and where it occurs. `hexmj reproduce --only KEY` recomputes a claim.",
+            "",
+            *(f"- {sentence}" for sentence in self.summary),
+            "",
+            *io.markdown_table(heads, rows),
+            "",
+            "## Rules",
+            "",
+            *io.markdown_table(("key", "quantity and rule"), rules),
+            "",
+            "## Judged in physics",
+            "",
+            "Kinematic walks cannot check these statements: see docs/results/paper.md.",
+            "",
+            *physical,
+        ]
         return "\n".join(lines) + "\n"
 
     def json(self) -> dict[str, Any]:
         """Return claims, summary and protocol as plain data, which can be written as JSON."""
         rows = []
         for row in self.rows:
-            claim, beside = row.claim, {name: _plain(answers) for name, answers in row.beside.items()}
+            claim = row.claim
             paper = {"key": claim.key, "section": claim.section, "paper": claim.text, "value": claim.value}
-            paper |= {"kind": claim.kind, "calibrates": list(claim.calibrates)}
-            how = {"rule": claim.rule.words, "fits": row.fits, "why": claim.why, "command": self.command(row)}
-            rows.append(paper | {"ours": _plain(row.answers), "beside": beside} | how)
+            paper |= {"kind": claim.kind, "calibrates": list(claim.calibrates), "why": claim.why}
+            beside = {name: _plain(answers) for name, answers in row.beside.items()}
+            ours = {"ours": _plain(row.answers), "beside": beside, "fits": row.fits}
+            rows.append(paper | {"rule": claim.judged_by} | ours)
         return {"claims": rows, "summary": self.summary, "protocol": asdict(self.protocol)}
-
-    def command(self, row: Row) -> str:
-        """Return the command that recomputes a row with the same protocol, seed and model variants."""
-        seed = self.protocol.seed
-        words = ["hexmj reproduce --only", row.claim.key]
-        words += ["--quick"] if self.protocol == Reproduction(quick=True, seed=seed).protocol else []
-        words += [f"--seed {seed}"] if seed != FULL.seed else []
-        words += ["--beside", *row.beside] if row.beside else []
-        return " ".join(words)
 
 
 def reproduce(
