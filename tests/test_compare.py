@@ -128,7 +128,6 @@ def test_processes_and_threads_give_the_same_bits(name, two_processes):
         ("vp", LDVS, {"axes": {"vp": []}}),
         ("vp", LDVS, {"axes": {"vp": [40.0, 40]}}),
         ("vp", LDVS, {"axes": {"vp": [40.0, -1.0]}}),
-        ("vp", LDVS, {"axes": {"vp": [40.0]}, "conditions": Conditions(vp=20.0)}),
         ("ground_height", LDVS, {"axes": {"ground_height": [1.0]}}),
     ],
 )

@@ -110,7 +110,6 @@ def test_walks_that_accelerate_are_not_refused_before_the_work() -> None:
     [
         ("periods", Biology, {"periods": 3}),
         ("vp", Biology, {"conditions": hexmj.Conditions(vp=38.0)}),
-        ("ground", Biology, {"conditions": hexmj.Conditions(ground="rough")}),
         ("axes", Comparison, {"axes": {"wind": (1.0,)}}),
         ("friction", Comparison, {"axes": {"friction": (-1.0,)}}),
         ("controllers", TaskStudy, {"controllers": {}}),

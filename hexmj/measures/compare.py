@@ -1,25 +1,29 @@
 """Comparison of the measures of stability on the same starts: planned feet, feet in the simulation, and falls."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Unpack, get_args
 
 import numpy as np
 
-from hexmj.conditions import SCALARS, Conditions
-from hexmj.controllers.protocol import Controller
-from hexmj.controllers.wrappers import Begins
+from hexmj.conditions import SCALARS, Conditions, check_ground
+from hexmj.controllers.planning import check_velocities
+from hexmj.controllers.protocol import Controller, settings_of
+from hexmj.controllers.wrappers import Begins, by_protocol
+from hexmj.errors import InputError
+from hexmj.io import attributes
 from hexmj.legs import LEGS
 from hexmj.measures import tables
 from hexmj.measures.figures import UNITS
 from hexmj.measures.precision import MEASURES, PLANNED, StratifiedWalks, plan_table
 from hexmj.measures.study import Study, outcome_table
+from hexmj.measures.tables import WalkSettings
 from hexmj.starts import draw_starts
 from hexmj.sweep import Cell, Execution, Round, over_axes, run_study
 from hexmj.timing import Acceleration, Stride
-from hexmj.validate import choice, number
+from hexmj.validate import choice, distinct, number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,12 +81,32 @@ class Comparison(Study):
     """Measures whose intervals `precision` limits -> outcome."""
 
     def __post_init__(self) -> None:
-        for name in self.axes:
-            choice("axes", name, SCALARS)
         if self.precision is not None:
             number("precision", self.precision, LEAST_PRECISION, 0.5)
             object.__setattr__(self, "n_starts", PLANNED)
         super().__post_init__()
+        distinct("controllers", [*self.controllers])
+        for controller in self.controllers.values():
+            settings_of(controller)  # raises InputError now rather than after the computation
+        choice("protocol", self.protocol, get_args(Begins))
+        if (self.acceleration or 0 in self.observed[0]) and self.protocol == "steady":
+            raise InputError("protocol = steady allows neither an acceleration nor V = 0; use the protocol random")
+        for name, values in self.axes.items():
+            choice("axes", name, SCALARS)
+            distinct(name, values)
+        for conditions in self.varied:
+            check_ground(conditions)
+
+    @property
+    def varied(self) -> list[Conditions]:
+        """The conditions of walks at every combination of the values of `axes`; the last axis varies fastest."""
+        rows = product(*self.axes.values())
+        return [replace(self.conditions, **dict(zip(self.axes, row, strict=True))) for row in rows]
+
+    @property
+    def observed(self) -> tuple[np.ndarray, np.ndarray]:
+        """The velocities V_r and their observation times [time units], both (velocity,)."""
+        return tables.observed(self.velocities, self.observation_time, self.stride, self.acceleration)
 
     @property
     def points(self) -> list[Point]:
@@ -92,14 +116,18 @@ class Comparison(Study):
 
     def cells(self) -> list[Cell]:
         """Return a cell for each of `points`: walks of all starts or, with a precision, the plans of all starts."""
-        self.check_walks(self.velocities)
+        for controller in self.controllers.values():
+            began = by_protocol(controller, self.protocol)
+            check_velocities(began, self.velocities, self.stride, self.acceleration)
         function, cost = (outcome_table, 1.0) if self.precision is None else (plan_table, PLANNING_COST)
         return [self._cell(point, function, cost) for point in self.points]
 
     def _cell(self, point: Point, function: Callable[..., Any], cost: float, **own: Any) -> Cell:
         """Return a cell at a point; `cost` is its computing time as a multiple of that of all walks."""
         name, conditions, v, t = point
-        walks = self.walks(v, t, conditions, self.controllers[name])
+        controller = by_protocol(self.controllers[name], self.protocol)
+        same = self.n_starts, self.seed, conditions, self.stride, self.acceleration
+        walks = WalkSettings(controller, v, t, *same)
         work = cost * walks.work * conditions.substeps(self.stride)
         return Cell(f"{name}-V-{v:g}", function, {"walks": walks, **own}, work)
 
@@ -154,8 +182,11 @@ class Comparison(Study):
             starts=(("start", "leg"), starts, {"units": "mm", "long_name": "tips at the start"}),
         )
         table.fall_part.attrs["flag_meanings"] = " ".join(self.conditions.body.trunk)
-        precise = {} if self.precision is None else {"precision": self.precision}
-        return self.labelled(table.transpose(*axes, "start", ...), "compare", **precise)
+        walks = self.observation_time, self.n_starts, self.seed, self.stride, self.acceleration
+        made = {"study": "compare", "protocol": self.protocol} | tables.settings(self.controllers, *walks)
+        made |= {} if self.precision is None else {"precision": self.precision}
+        made["conditions"] = {k: v for k, v in self.conditions.settings().items() if k not in self.axes}
+        return table.transpose(*axes, "start", ...).assign_attrs(attributes(made))
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from hexmj.controllers.protocol import Controller
+from hexmj.controllers.planning import check_velocities
+from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
-from hexmj.io import markdown_table
+from hexmj.io import attributes, markdown_table
 from hexmj.measures.figures import caption
-from hexmj.measures.study import GROUND, Study
+from hexmj.measures.study import Study
+from hexmj.measures.tables import WalkSettings, settings
 from hexmj.phases import unrolled
 from hexmj.plotting import CURVE, LEGEND, SERIES, head, picture, tidy
 from hexmj.studies.quantities import JOINTS, PHASES, SEGMENTS, UNITS, quantity_table
@@ -176,9 +178,15 @@ class Biology(Study):
     """Number of periods of a single leg that each start walks; the last three are measured."""
     n_starts: int = field(default=20, kw_only=True)
 
-    hidden: ClassVar[tuple[str, ...]] = ("grasp", *GROUND)
+    hidden: ClassVar[tuple[str, ...]] = (
+        "grasp",
+        "ground",
+        *(f"ground_{end}" for end in ("height", "at", "length", "seed")),
+    )
+    """Conditions without an option of the command."""
 
     def __post_init__(self) -> None:
+        settings_of(self.controller)  # raises InputError now rather than after the computation
         whole("periods", self.periods, MEASURED + 1, 1000)
         if not max(SPEEDS) < self.conditions.vp:
             raise InputError(f"vp = {self.conditions.vp}; expected above {max(SPEEDS):g} mm/s, the fastest walk")
@@ -191,11 +199,12 @@ class Biology(Study):
 
     def cells(self) -> list[Cell]:
         """Return a cell for each of the `SPEEDS`, computed by `quantity_table`."""
-        self.check_walks(self.velocities)
+        check_velocities(self.controller, self.velocities, self.stride)
         cells = []
         for speed, velocity in zip(SPEEDS, self.velocities, strict=True):
             period = float(self.stride.periods(velocity))
-            walks = self.walks(velocity, self.periods * period, self.conditions)
+            same = self.n_starts, self.seed, self.conditions, self.stride
+            walks = WalkSettings(self.controller, velocity, self.periods * period, *same)
             own = {"walks": walks, "measured": MEASURED * period}
             cells.append(Cell(f"{speed:g}-mm-s", quantity_table, own, 1 / velocity))
         return cells
@@ -224,8 +233,10 @@ class Biology(Study):
         }
         units = dict.fromkeys(("mean", "low", "high", "animal_low", "animal_high"), "of the row") | {"at": "mm/s"}
         rows = {name: ("row", column, {"units": units.get(name, "1")}) for name, column in columns.items()}
-        own = {"observation_time": f"{self.periods} periods", "periods": self.periods, "speeds": list(SPEEDS)}
-        return self.labelled(table.assign(rows), "biology", **own)
+        walks = f"{self.periods} periods", self.n_starts, self.seed, self.stride, None
+        made = {"study": "biology"} | settings({self.controller.name: self.controller}, *walks)
+        made |= {"periods": self.periods, "speeds": list(SPEEDS), "conditions": self.conditions.settings()}
+        return table.assign(rows).assign_attrs(attributes(made))
 
 
 def _mean(values: np.ndarray, quantity: str) -> tuple[float, float, float]:
