@@ -28,7 +28,6 @@ from .measures.compare import compare as compare
 from .measures.compare import physical_flss as physical_flss
 from .measures.kinematic import dynamic_losses as dynamic_losses
 from .measures.kinematic import first_loss as first_loss
-from .measures.kinematic import flds as flds
 from .measures.kinematic import flss as flss
 from .measures.kinematic import flss_over_range as flss_over_range
 from .measures.kinematic import walk as walk

@@ -12,18 +12,15 @@ import re
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from importlib.metadata import version
 from inspect import getsource, signature
 from multiprocessing import get_context, parent_process
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypedDict, Unpack
-
-import numpy as np
 
 from hexmj.errors import InputError, without_extra
 from hexmj.files import read_netcdf, write_netcdf
@@ -54,10 +51,10 @@ class Cell:
     work: float = 1.0
     """Relative computing time of the cell, for the progress bar."""
 
-    def compute(self, *first: Any, **execution: Any) -> Any:
-        """Call the function with `first`, its settings, and the arguments of `execution` that the function has."""
+    def compute(self, **execution: Any) -> Any:
+        """Call the function with its settings, and with the arguments of `execution` that it has."""
         accepted = signature(self.function).parameters
-        return self.function(*first, **self.settings, **{k: v for k, v in execution.items() if k in accepted})
+        return self.function(**self.settings, **{k: v for k, v in execution.items() if k in accepted})
 
     def record(self) -> str:
         """Return the content of the cache key as JSON: the function, its settings, the sources and the versions.
@@ -100,7 +97,8 @@ class Execution(TypedDict, total=False):
     """Executor that computes the cells in threads, in processes or on other machines that share the folder; by default,
     this process computes the cells one after another."""
     progress: Progress | bool | None
-    """True shows a progress bar; a function is called with the fraction of the new work done since its last call."""
+    """True shows a progress bar; a function is called with the fraction of the new work done since its last call. With
+    an executor, progress advances when a cell is finished."""
     threads: int | None
     """Number of threads of each cell; by default one per core, or one if there is an executor."""
     fresh: bool
@@ -116,7 +114,7 @@ class Round(NamedTuple):
 
 
 def run_study(study: Study, folder: Path | str | None = None, **execution: Unpack[Execution]) -> "xr.Dataset":
-    """Run a study and return its result; arguments and errors are those of `finished_cells`.
+    """Run a study and return its result; arguments and errors are those of `run_cells`.
 
     A study may have a method `next_round(data)`, which returns the `Round` that follows after cells with these results;
     the study ends at a round without cells. Other studies have one round of `cells`.
@@ -137,16 +135,7 @@ def run_study(study: Study, folder: Path | str | None = None, **execution: Unpac
 def run_cells(
     cells: Sequence[Cell], folder: Path | str | None = None, **execution: Unpack[Execution]
 ) -> list["xr.Dataset"]:
-    """Compute cells and return their results in order; arguments and errors are those of `finished_cells`."""
-    with shown(execution.get("progress"), "computing") as progress:
-        found = dict(finished_cells(cells, folder, **execution | {"progress": progress}))
-    return [found[i] for i in range(len(cells))]
-
-
-def finished_cells(
-    cells: Sequence[Cell], folder: Path | str | None = None, **execution: Unpack[Execution]
-) -> Iterator[tuple[int, "xr.Dataset"]]:
-    """Compute cells and yield each with its index as soon as it is finished.
+    """Compute cells and return their results in order.
 
     Args:
         cells: cells to compute.
@@ -159,36 +148,45 @@ def finished_cells(
     """
     if unknown := execution.keys() - Execution.__annotations__:
         raise TypeError(f"unexpected keyword arguments: {', '.join(sorted(unknown))}")
-    executor, progress, threads = (execution.get(name) for name in ("executor", "progress", "threads"))
-    done = [0.0] * len(cells)
+    executor, threads = execution.get("executor"), execution.get("threads")
     paths: list[Path | None] = [None] * len(cells)
     if folder is not None:
         Path(folder).mkdir(parents=True, exist_ok=True)
         paths = [Path(folder).absolute() / f"{cell.stem(cell.record())}.nc" for cell in cells]
-        if execution.get("fresh"):
-            for path in filter(None, paths):
-                path.unlink(missing_ok=True)
+    if execution.get("fresh"):
+        for path in filter(None, paths):
+            path.unlink(missing_ok=True)
 
-    left = {i: cells[i] for i, path in enumerate(paths) if not (path and path.exists())}
-    total = sum(cell.work for cell in left.values())
+    found = {i: _cached(path) for i, path in enumerate(paths) if path and path.exists()}
+    left = [i for i in range(len(cells)) if i not in found]
+    total = sum(cells[i].work for i in left)
+    with shown(execution.get("progress"), "computing") as progress:
+        if executor is None:
+            for i in left:
+                advance = _Share(part_of(progress, cells[i].work / total))
+                found[i] = _computed(cells[i], paths[i], threads=threads, progress=advance)
+                advance(1.0)
+        else:
+            for i, data in _on_executor(executor, {i: (cells[i], paths[i]) for i in left}, threads or 1):
+                found[i] = data
+                if progress:
+                    progress(cells[i].work / total)
+        if progress and not left:
+            progress(1.0)
+    return [found[i] for i in range(len(cells))]
 
-    def advance(i: int, fraction: float) -> None:
-        fraction = min(fraction, 1.0 - done[i])
-        done[i] += fraction
-        if fraction and callable(progress):
-            progress(fraction * cells[i].work / total)
 
-    yield from ((i, _cached(path)) for i, path in enumerate(paths) if path and i not in left)
-    if executor is None:
-        each = ((i, {"threads": threads, "progress": partial(advance, i)}) for i in left)
-        computed = ((i, _computed(cells[i], paths[i], **arguments)) for i, arguments in each)
-    else:
-        computed = _on_executor(executor, left, paths, threads or 1, lambda i, fraction: advance(i, fraction - done[i]))
-    for i, data in computed:
-        advance(i, 1.0)
-        yield i, data
-    if not left and callable(progress):
-        progress(1.0)
+class _Share:
+    """Progress function of a cell, which a cell may call or not; in all, it passes on a fraction of 1 at most."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress, self._left = progress, 1.0
+
+    def __call__(self, fraction: float) -> None:
+        fraction = min(fraction, self._left)
+        self._left -= fraction
+        if fraction and self._progress:
+            self._progress(fraction)
 
 
 def _computed(cell: Cell, path: Path | None, **execution: Any) -> "xr.Dataset":
@@ -213,38 +211,20 @@ def _cached(path: Path) -> "xr.Dataset":
 
 
 def _on_executor(
-    executor: Executor,
-    cells: Mapping[int, Cell],
-    paths: Sequence[Path | None],
-    threads: int,
-    reached: Callable[[int, float], None],
+    executor: Executor, cells: Mapping[int, tuple[Cell, Path | None]], threads: int
 ) -> Iterator[tuple[int, "xr.Dataset"]]:
-    """Yield cells as they finish; call `reached` with the fraction of a cell that a worker on this machine has done."""
-    with TemporaryDirectory() as folder:
-        reports = np.memmap(Path(folder, "done"), float, "w+", shape=len(paths))
-        how = {i: {"threads": threads, "progress": partial(_report, str(reports.filename), i)} for i in cells}
-        futures = {executor.submit(_computed, cell, paths[i], **how[i]): i for i, cell in cells.items()}
-        running = set(futures)
-        try:
-            while running:
-                finished, running = wait(running, 0.5, FIRST_COMPLETED)
-                for i in map(futures.__getitem__, running):
-                    reached(i, float(reports[i]))
-                for future in finished:
-                    yield futures[future], future.result()
-        except BrokenExecutor:
-            raise InputError(
-                "A worker process died. Finished cells are cached. Run again, with fewer processes if memory ran out."
-            ) from None
-        finally:
-            for future in futures:
-                future.cancel()
-
-
-def _report(file: str, i: int, fraction: float) -> None:
-    """Add what a worker has done of cell i to the file of the reports, which other machines do not have."""
-    with suppress(OSError):
-        np.memmap(file, float, "r+")[i] += fraction
+    """Compute cells, each with the path of its file, and yield each with its key as soon as it is finished."""
+    futures = {executor.submit(_computed, *cell, threads=threads): i for i, cell in cells.items()}
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    except BrokenExecutor:
+        raise InputError(
+            "A worker process died. Finished cells are cached. Run again, with fewer processes if memory ran out."
+        ) from None
+    finally:
+        for future in futures:
+            future.cancel()
 
 
 def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: Any) -> "xr.Dataset":
@@ -263,68 +243,6 @@ def over_axes(sizes: Mapping[str, int], data: Sequence["xr.Dataset"], **concat: 
     for name, size in reversed(list(sizes.items())):
         rows = [xr.concat(rows[i : i + size], name, **concat) for i in range(0, len(rows), size)]
     return rows[0]
-
-
-class CachedValues:
-    """A function of rows of numbers that computes the value of every row once and caches the values in a text file.
-
-    The function of the cell, (row, number) -> (row,), must compute each value from its row alone. Each line of the file
-    holds a row and its value in hexadecimal; an incomplete line, left by a killed process, is ignored.
-    """
-
-    def __init__(
-        self, cell: Cell, folder: Path | str | None = None, *, threads: int | None = None, fresh: bool = False
-    ) -> None:
-        """Read the values that are cached in the folder.
-
-        Args:
-            cell: function of the rows, with its settings and its name.
-            folder: folder of the text file; None keeps the values in memory only.
-            threads: number of threads, passed to the function if it has this argument.
-            fresh: True discards the values in the file.
-        """
-        self._cell, self._threads, self._path = cell, threads, None
-        self._values: dict[bytes, float] = {}
-        if folder is not None:
-            self._path = Path(folder) / f"{cell.stem(cell.record())}.txt"
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            if fresh:
-                self._path.unlink(missing_ok=True)
-            self._values = dict(_read_values(self._path))
-        self._read = frozenset(self._values)
-        self._replayed: set[bytes] = set()
-
-    def __call__(self, rows: np.ndarray) -> np.ndarray:
-        """Return the values, (row,), of `rows`, (row, number); only new rows are computed."""
-        rows = np.ascontiguousarray(rows, dtype=float)
-        keys = [row.tobytes() for row in rows]
-        self._replayed |= self._read.intersection(keys)
-        new = {key: i for i, key in enumerate(keys) if key not in self._values}
-        if new:
-            values = self._cell.compute(rows[list(new.values())], threads=self._threads).tolist()
-            if self._path:
-                with self._path.open("a") as file:
-                    file.writelines(f"\n{k.hex()} {v.hex()}\n" for k, v in zip(new, values, strict=True))
-            self._values |= zip(new, values, strict=True)
-        return np.array([self._values[key] for key in keys])
-
-    @property
-    def known(self) -> int:
-        """Number of distinct rows whose values are known."""
-        return len(self._values)
-
-    @property
-    def replayed(self) -> int:
-        """Number of distinct rows whose values were read from the file instead of computed."""
-        return len(self._replayed)
-
-
-def _read_values(path: Path) -> Iterator[tuple[bytes, float]]:
-    for line in path.read_text().splitlines(keepends=True) if path.exists() else ():
-        with suppress(ValueError):  # an empty or incomplete line
-            row, value = line.split()
-            if line.endswith("\n"):
-                yield bytes.fromhex(row), float.fromhex(value)
 
 
 @contextmanager

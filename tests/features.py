@@ -49,7 +49,7 @@ RENAMED: dict[str, str] = {
     "tried_at": "trial_velocity",
 }  # key, file name or text in the reference -> its new name
 # Keys and file names that are not compared; see `walk settings`.
-IGNORED = {"settings", "replayed", "variants.py", "model_variants.py"}
+IGNORED = {"settings", "variants.py", "model_variants.py"}
 TOLERANCE = {"rel_tol": 1e-4, "abs_tol": 1e-6}  # of floating-point numbers
 LONGEST = 12  # longer arrays of numbers are stored as a summary
 COARSE = hexmj.Stride(dt=0.5)

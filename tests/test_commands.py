@@ -193,7 +193,6 @@ def test_json_is_one_object_and_nothing_else_on_standard_output(tmp_path):
     for key in ("velocity", "flss", "low", "high"):
         assert answer[key] == table[key].values.tolist()
     assert answer["settings"]["observation_time"] == "start"
-    assert answer["sample_sd"] == [None, None]
 
 
 @pytest.mark.slow

@@ -67,11 +67,7 @@ def test_what_was_found_falls_as_rarely_from_fresh_starts_as_is_written():
     problem, _ = search.settings(search.parse("search", shlex.split(found["command"])[2:]))
     assert problem.controller(problem.form.vector(EVOLVED)) == EVOLVED
     few = found["fresh_few"]
-    (flss,) = (
-        Sample(problem, few["starts"], few["seed"])
-        .verdict({"evolved": EVOLVED})
-        .flss.sel(observation_time=problem.observation_time)
-    )
+    flss = Sample(problem, few["starts"], few["seed"]).verdict({"evolved": EVOLVED}).flss.item()
     assert flss * few["starts"] == pytest.approx(few["falls"], abs=1.5)  # other processors round otherwise
 
 

@@ -73,8 +73,8 @@ def begin(controller, *arguments, **options):
 
 
 def test_a_foreign_controller_tips_likewise():
-    for measured in (hexmj.flds(one, [0.5], n_starts=60).flds.item() for one in (Own(), LDVS)):
-        assert measured == hexmj.flds(LDVS, [0.5], n_starts=60, threads=1, range_of=7).flds.item()
+    for measured in (hexmj.flss(one, [0.5], n_starts=60, measure="dynamic").flds.item() for one in (Own(), LDVS)):
+        assert measured == hexmj.flss(LDVS, [0.5], n_starts=60, measure="dynamic", threads=1, range_of=7).flds.item()
 
 
 def test_a_constant_margin_tips_as_the_equation_says():

@@ -52,7 +52,7 @@ class Search(Command):
             title(problem, effort),
             table(("parameter", *result.vectors), numbers),
             f"{problem.frequency} on {effort.verdict_starts} fresh starts (seed {effort.verdict_seed}), 95 % intervals",
-            grid(result.verdict, ("controller", "observation_time"), ("flss",)),
+            grid(result.verdict, ("controller",), ("flss",)),
             *result.found.report(problem),
         ]
         return Answer(result.summary(), lines, result.files, result.settings)

@@ -121,8 +121,7 @@ class Flss(StudyCommand):
         yield grid(result, ("velocity",), columns)
         if "walks" in result:
             yield PLAIN
-        spread = "; sample sd: standard deviation over samples of 1000 starts" if "sample_sd" in columns else ""
-        yield f"low, high: 95 % interval; duration: observation time [time units]{spread}"
+        yield "low, high: 95 % interval; duration: observation time [time units]"
         if measure == "physical":
             yield report_line(physical_report(result))
 

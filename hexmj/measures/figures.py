@@ -153,7 +153,7 @@ def _panels(result: "xr.Dataset") -> "dict[str, xr.Dataset]":
 
 
 def flss_figure(result: "xr.Dataset") -> "Figure":
-    """Draw a result of `flss`, `flds` or `physical_flss`: the frequency against velocity with 95 % intervals."""
+    """Draw a result of `flss` or `physical_flss`: the frequency against velocity with 95 % intervals."""
     name, measure, label = "flss", "kinematic", "kinematic FLSS"
     if "flds" in result:
         name, measure, label = "flds", "dynamic", "FLDS"

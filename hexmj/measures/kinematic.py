@@ -3,7 +3,6 @@
 FLDS is the frequency of the loss of dynamic stability, see `tipping`.  It depends on V_p and on the standing height.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -20,10 +19,10 @@ from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.controllers.steered import begin
 from hexmj.errors import InputError
 from hexmj.io import attributes
-from hexmj.measures.tables import WalkSettings, frequency_table, losses_by_sample, observed, settings
+from hexmj.measures.tables import WalkSettings, observed, settings, velocity_axis
 from hexmj.progress import Progress
 from hexmj.starts import MOST_STARTS, SAMPLE, check_draw, draw_slabs
-from hexmj.stats import wilson_interval
+from hexmj.stats import wilson_interval, wilson_intervals
 from hexmj.sweep import Cell, Execution, run_study
 from hexmj.timing import Acceleration, Stride, observation_duration, steps_within
 from hexmj.tipping import Pendulum
@@ -135,11 +134,7 @@ def _times(steps: np.ndarray, stride: Stride) -> np.ndarray:
 
 @dataclass(frozen=True)
 class KinematicFlss:
-    """FLSS or FLDS of a controller's plan, with a cell for each velocity and range of starts.
-
-    The ranges divide the seed's sequence of random starts. Losses are counted for each sample of 1000 starts of that
-    sequence, so that the result does not depend on the size of the ranges.
-    """
+    """FLSS or FLDS of a controller's plan, with a cell for each velocity and range of the seed's random starts."""
 
     controller: Controller
     """Controller that plans the walks."""
@@ -193,17 +188,25 @@ class KinematicFlss:
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":
-        """Return the dataset that `flss` or `flds` describes, from the datasets of all cells."""
-        losses = np.zeros((len(self.velocities), math.ceil(self.n_starts / SAMPLE)), dtype=int)
-        for (i, first), counted in zip(self.places, data, strict=True):
-            begin = first // SAMPLE
-            losses[i, begin : begin + counted.sizes["sample"]] += counted.losses.values
+        """Return the dataset that `flss` describes, from the datasets of all cells."""
+        import xarray as xr
+
+        losses = np.reshape([counted.losses.item() for counted in data], (len(self.velocities), -1)).sum(axis=1)
+        low, high = wilson_intervals(losses, self.n_starts)
+        name, kind = ("flds", "dynamic") if self.measure == "dynamic" else ("flss", "static")
+        columns = {
+            name: (losses / self.n_starts, f"frequency of the loss of {kind} stability"),
+            "low": (low, "lower end of the 95 % Wilson interval"),
+            "high": (high, "upper end of the 95 % Wilson interval"),
+        }
+        variables = {
+            key: ("velocity", values, {"units": "1", "long_name": text}) for key, (values, text) in columns.items()
+        }
         walks = self.observation_time, self.n_starts, self.seed, self.stride, self.acceleration
         made = {"study": "flss"} | settings({self.controller.name: self.controller}, *walks)
         if self.measure == "dynamic":
             made |= {"conditions": self.conditions.settings()}
-        table = frequency_table(losses, self.n_starts, *self.observed, self.measure)
-        return table.assign_attrs(attributes(made))
+        return xr.Dataset(variables).assign(velocity_axis(*self.observed)).assign_attrs(attributes(made))
 
 
 def losses_of_range(
@@ -213,15 +216,10 @@ def losses_of_range(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> "xr.Dataset":
-    """Count losses of stability among `walks.n_starts` starts, of which the first has the index `first`.
-
-    Returns:
-        `losses`, (sample,), in samples of 1000 starts of the seed; the first and the last sample may be incomplete.
-    """
+    """Count the `losses` of stability among `walks.n_starts` starts, of which the first has the index `first`."""
     import xarray as xr
 
-    begin = first // SAMPLE
-    losses = np.zeros(math.ceil((first + walks.n_starts) / SAMPLE) - begin, dtype=int)
+    losses = 0
     how: Any = {"stride": walks.stride, "acceleration": walks.acceleration, "threads": threads}
     for x in draw_slabs(walks.n_starts, walks.seed, walks.stride, first):
         arguments = x, walks.controller, walks.velocity, walks.duration
@@ -229,12 +227,10 @@ def losses_of_range(
             times = dynamic_losses(*arguments, conditions=walks.conditions, **how).dynamic
         else:
             times = first_loss(*arguments, **how)
-        count = losses_by_sample(np.isfinite(times)[None], first)[0]
-        losses[first // SAMPLE - begin :][: len(count)] += count
-        first += len(x)
+        losses += np.count_nonzero(np.isfinite(times))
         if progress:
             progress(len(x) / walks.n_starts)
-    return xr.Dataset({"losses": ("sample", losses, {"units": "1", "long_name": f"starts with a {measure} loss"})})
+    return xr.Dataset({"losses": ((), losses, {"units": "1", "long_name": f"starts with a {measure} loss"})})
 
 
 def flss(
@@ -263,14 +259,14 @@ def flss(
         stride: step range, lines of the tips and time step.
         acceleration: the accelerating procedure of Eq. 11; without it V_r is constant.
         range_of: number of starts that are computed and cached together; the result does not depend on it.
-        measure: 'kinematic', or 'dynamic' for the FLDS, see `flds`.
-        conditions: conditions of the dynamic measure.
+        measure: 'kinematic', or 'dynamic' for the FLDS, the frequency of the loss of dynamic stability (`tipping`).
+        conditions: V_p and standing height of the dynamic measure; the others have no effect.
         folder: directory in which finished cells are cached; None caches nothing.
         how: options of `sweep.Execution`, such as `executor` and `threads`; the result does not depend on them.
 
     Returns:
-        Over velocity: `flss`, the ends `low` and `high` of its 95 % Wilson interval, the standard deviation `sample_sd`
-        over samples of 1000 starts, and the observation time `duration` [time units].
+        Over velocity: `flss`, or `flds` for the dynamic measure; the ends `low` and `high` of its 95 % Wilson interval;
+        and the observation time `duration` [time units].
 
     Raises:
         InputError: an argument is out of range.
@@ -278,30 +274,6 @@ def flss(
     several: Any = np.atleast_1d(velocities).tolist()
     walks = n_starts, observation_time, seed, stride, acceleration
     return run_study(KinematicFlss(controller, several, *walks, range_of, measure, conditions), folder, **how)
-
-
-def flds(
-    controller: Controller,
-    velocities: Sequence[float] | float,
-    *,
-    conditions: Conditions = Conditions(),
-    **options: Any,
-) -> "xr.Dataset":
-    """Return the FLDS, the frequency of the loss of dynamic stability, at each velocity, over the same starts.
-
-    Args:
-        controller: controller that plans the walks.
-        velocities: one or several V_r, each 0 <= V < 1; the final velocities when accelerating.
-        conditions: V_p and standing height, from which the pendulum follows, see `tipping`; the others have no effect.
-        options: other arguments of `flss`.
-
-    Returns:
-        The variables of `flss`, with `flds` in place of `flss`.
-
-    Raises:
-        InputError: an argument is out of range.
-    """
-    return flss(controller, velocities, measure="dynamic", conditions=conditions, **options)
 
 
 def flss_over_range(

@@ -9,7 +9,7 @@ import numpy as np
 from hexmj.conditions import Conditions
 from hexmj.controllers.protocol import Controller, settings_of
 from hexmj.errors import InputError
-from hexmj.starts import SAMPLE, checked_list, draw_starts
+from hexmj.starts import checked_list, draw_starts
 from hexmj.stats import wilson_intervals
 from hexmj.timing import Acceleration, Stride, check_reached, observation_duration, steps_within
 
@@ -110,44 +110,6 @@ def over_start(columns: Mapping[str, np.ndarray], units: Mapping[str, str] = {})
     import xarray as xr
 
     return xr.Dataset({name: ("start", values, {"units": units.get(name, "1")}) for name, values in columns.items()})
-
-
-def losses_by_sample(lost: np.ndarray, first: int = 0) -> np.ndarray:
-    """Count losses in each sample of 1000 starts.
-
-    Args:
-        lost: whether each start loses stability, (velocity, start).
-        first: index of the first of these starts in its seed; the first and the last sample may be incomplete.
-
-    Returns:
-        Number of losses, (velocity, sample).
-    """
-    begin = np.arange(-(first % SAMPLE), lost.shape[1], SAMPLE).clip(0)
-    return np.add.reduceat(lost, begin, axis=1, dtype=int)
-
-
-def frequency_table(
-    losses: np.ndarray, n_starts: int, velocities: np.ndarray, duration: np.ndarray, measure: str = "kinematic"
-) -> "xr.Dataset":
-    """Return FLSS, or FLDS if the measure is dynamic, over velocity, from the losses in each sample.
-
-    `losses` is (velocity, sample); the table also has the 95 % interval and the spread of the samples.
-    """
-    import xarray as xr
-
-    name, kind = ("flds", "dynamic") if measure == "dynamic" else ("flss", "static")
-    total = losses.sum(axis=1)
-    low, high = wilson_intervals(total, n_starts)
-    samples = losses[:, : n_starts // SAMPLE] / SAMPLE
-    spread = samples.std(axis=1, ddof=1) if samples.shape[1] > 1 else np.full(len(total), np.nan)
-    columns = {
-        name: (total / n_starts, f"frequency of the loss of {kind} stability"),
-        "low": (low, "lower end of the 95 % Wilson interval"),
-        "high": (high, "upper end of the 95 % Wilson interval"),
-        "sample_sd": (spread, "standard deviation over samples of 1000 starts"),
-    }
-    table = {name: ("velocity", values, {"units": "1", "long_name": text}) for name, (values, text) in columns.items()}
-    return xr.Dataset(table).assign(velocity_axis(velocities, duration))
 
 
 def happened(time: "xr.DataArray") -> "xr.DataArray":

@@ -1,7 +1,7 @@
 """Cost functions of a search (paper, Section 3): Problem 1 at one velocity, Problem 2 at random ones of a range."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -19,7 +19,7 @@ from hexmj.search.algorithms import Domain
 from hexmj.search.forms import Form, NetworkForm
 from hexmj.starts import draw_starts
 from hexmj.stats import wilson_intervals
-from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride, observation_duration, steps_within
+from hexmj.timing import Acceleration, Stride, observation_duration, steps_within
 from hexmj.validate import choice, number
 from hexmj.variants import variants, varied
 
@@ -83,12 +83,6 @@ class Problem:
         """Whether bodies walk."""
         return self.measure == "physical"
 
-    @property
-    def observation_times(self) -> list[str | float]:
-        """Observation times of the verdict: that of the cost first, then 'walk' (if all V > 0) and 'start'."""
-        named = [name for name in OBSERVATION_TIMES if self.low > 0 or name != "walk"]
-        return list(dict.fromkeys([self.observation_time, *named]))
-
     def domain(self, reach: float, begin: Controller | None = None) -> Domain:
         """Return the box of the initial population, which begins with the vector of `begin`, if given.
 
@@ -119,9 +113,7 @@ class Problem:
 
     def settings(self) -> dict[str, Any]:
         """Return the problem as plain data."""
-        names = "form", "low", "high", "observation_time", "measure", "feedback", "over", "ties"
-        own = {name: plain(getattr(self, name)) for name in names}
-        own |= {"stride": asdict(self.stride), "acceleration": self.acceleration and asdict(self.acceleration)}
+        own = {name: plain(value) for name, value in vars(self).items() if name != "conditions"}
         return own | {"conditions": self.conditions.settings()}
 
 
@@ -184,7 +176,7 @@ class Sample:
         except ValueError:
             return REFUSED
         try:
-            times, (ends,) = self._times(controller, [self.problem.observation_time], threads)
+            times, ends = self._times(controller, threads)
         except (OutOfReach, Refused, SimulationError):
             return REFUSED
         lost = (times <= ends).sum().item()
@@ -196,12 +188,12 @@ class Sample:
         """Raise InputError or SimulationError if a candidate, (parameter,), cannot walk; return None otherwise."""
         self.settle(threads)
         for one in self.variants.values():
-            one._times(one.problem.controller(vector), [one.problem.observation_time], threads)
+            one._times(one.problem.controller(vector), threads)
 
     def verdict(
         self, controllers: Mapping[str, Controller], threads: int | None = None, progress: Progress | None = None
     ) -> "xr.Dataset":
-        """Return the FLSS of each controller and observation time, with its 95 % Wilson interval.
+        """Return the FLSS of each controller, with its 95 % Wilson interval.
 
         The interval of a mean over variants is that of the rounded mean count. It is too wide, because it assumes that
         a start is lost under all variants or under none. Raises InputError if a controller cannot walk.
@@ -209,44 +201,38 @@ class Sample:
         import xarray as xr
 
         self.settle(threads)
-        observation_times = self.problem.observation_times
         advance = part_of(progress, 1.0 / len(controllers) / len(self.variants))
 
-        def losses(variant: str, controller: Controller) -> np.ndarray:
-            """Return the number of starts that lose stability within each observation time, (observation time,)."""
-            times, ends = self.variants[variant]._times(varied(controller, variant), observation_times, threads)
+        def losses(variant: str, controller: Controller) -> int:
+            """Return the number of starts that lose stability."""
+            times, ends = self.variants[variant]._times(varied(controller, variant), threads)
             if advance:
                 advance(1.0)
-            return (times <= ends).sum(axis=1)
+            return int(np.count_nonzero(times <= ends))
 
         lost = self._combined([[losses(name, one) for one in controllers.values()] for name in self.variants])
         interval = wilson_intervals(np.rint(lost), self.n_starts)
-        return xr.Dataset(
-            columns("flss", ("controller", "observation_time"), lost / self.n_starts, *interval),
-            coords={"controller": list(controllers), "observation_time": list(map(str, observation_times))},
-        )
+        table = columns("flss", ("controller",), lost / self.n_starts, *interval)
+        return xr.Dataset(table, coords={"controller": list(controllers)})
 
-    def _times(
-        self, controller: Controller, observation_times: list[str | float], threads: int | None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Walk, and return when each start loses stability, or falls, and when its observation times end.
+    def _times(self, controller: Controller, threads: int | None) -> tuple[np.ndarray, np.ndarray]:
+        """Walk, and return when each start loses stability, or falls, and when its observation time ends.
 
         Returns:
-            Times of loss, (start,), and ends, (observation time, start) [time units]. An end is later by a millionth
-            of a step, so that a loss in the last step counts.
+            Times of loss and ends, (start,) each [time units]. An end is later by a millionth of a step, so that a loss
+            in the last step counts.
         """
         p, dt = self.problem, self.problem.stride.dt
-        times = [observation_duration(time, self.velocity, p.stride, p.acceleration) for time in observation_times]
-        ends = np.array([steps_within(time, p.stride) for time in times]) * dt
-        longest, how = ends.max(axis=0), {"acceleration": p.acceleration, "threads": threads}
+        duration = observation_duration(p.observation_time, self.velocity, p.stride, p.acceleration)
+        ends, how = steps_within(duration, p.stride) * dt, {"acceleration": p.acceleration, "threads": threads}
         if p.physical:
             from hexmj.measures.physical import physical_outcomes
 
             (settled,) = self._settled
-            lost = physical_outcomes(settled, controller, self.velocity, float(longest.max()), **how).fall
+            lost = physical_outcomes(settled, controller, self.velocity, float(ends.max()), **how).fall
         elif p.measure == "dynamic":
-            walks = self.starts, controller, self.velocity, longest
+            walks = self.starts, controller, self.velocity, ends
             lost = dynamic_losses(*walks, conditions=p.conditions, stride=p.stride, **how).dynamic
         else:
-            lost = first_loss(self.starts, controller, self.velocity, longest, stride=p.stride, **how)
+            lost = first_loss(self.starts, controller, self.velocity, ends, stride=p.stride, **how)
         return lost, ends + 1e-6 * dt

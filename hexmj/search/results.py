@@ -41,7 +41,7 @@ class Result:
     vectors: dict[str, np.ndarray]
     """Parameters, (parameter,), of the found controller and of the compared controllers, by name."""
     verdict: "xr.Dataset"
-    """FLSS with its 95 % interval on fresh starts, over (controller, observation time)."""
+    """FLSS with its 95 % interval on fresh starts, over controller."""
     files: list[Path]
 
     @property
@@ -53,16 +53,14 @@ class Result:
 
     def summary(self) -> dict[str, Any]:
         """Return parameters, cost, verdict and settings as plain data, which can be written as JSON."""
-        found, judged = self.found, self.verdict.to_dataframe()
-        names, times = judged.index.levels
+        found = self.found
         return {
             "found": dict(zip(self.problem.form.names, found.vector.tolist(), strict=True)),
             "cost": found.cost,
             "evaluations": found.history.sizes["evaluation"],
-            "replayed": found.replayed,
             "minimised": self.problem.minimised,
             "starts": found.starts,
-            "verdict": {name: {time: judged.loc[name, time].to_dict() for time in times} for name in names},
+            "verdict": self.verdict.to_dataframe().to_dict("index"),
             "settings": self.settings,
         }
 

@@ -2,23 +2,25 @@
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import load_controller
 from hexmj.errors import without_extra
+from hexmj.io import results_folder
 from hexmj.plain import plain
 from hexmj.progress import Progress, shown
 from hexmj.search.algorithms import CovarianceAdaptation, Evolution, refine, search_population
 from hexmj.search.problems import REFUSED, Problem, Sample
 from hexmj.starts import SAMPLE, check_draw
-from hexmj.sweep import CachedValues, Cell
+from hexmj.sweep import Cell
 from hexmj.validate import choice, whole
 
 if TYPE_CHECKING:
@@ -92,13 +94,11 @@ class Found:
     """Number of starts of the last stage."""
     history: "xr.Dataset"
     """All candidates and their costs, see the function `history`."""
-    replayed: int
-    """Number of distinct candidates whose costs were read from the cache of an earlier run."""
 
     def report(self, problem: Problem) -> list[str]:
         """Return lines for printing: evaluations, lowest cost, and candidates that cost 1."""
         least = f"lowest cost {self.cost:.4g}" + (f" ({problem.minimised})" if problem.ties == "later" else "")
-        lines = [f"{len(self.history.cost)} evaluations, {self.replayed} candidates from the cache; {least}"]
+        lines = [f"{len(self.history.cost)} evaluations; {least}"]
         if lost := int((self.history.cost.values >= REFUSED).sum()):
             lines.append(f"evaluations that cost 1: {lost}; all starts lost stability, or the candidate cannot walk")
         return lines
@@ -132,9 +132,8 @@ def search(
     budgets = dict(zip(STAGES, (effort.budget, effort.refine_budget), strict=True))
     sizes = dict(zip(STAGES, (effort.starts or 0, effort.refine_starts or 0), strict=True))
     samples = {stage: Sample(problem, sizes[stage], effort.seed) for stage in STAGES if budgets[stage]}
-    how: Any = {"threads": threads, "fresh": fresh}
-    cached = {stage: CachedValues(Cell(stage, sample.costs, {}), folder, **how) for stage, sample in samples.items()}
-    work = {stage: max(1, budgets[stage] - values.known) * sizes[stage] for stage, values in cached.items()}
+    cached = {stage: CachedCosts(stage, sample, folder, threads, fresh) for stage, sample in samples.items()}
+    work = {stage: max(1, budgets[stage] - len(costs.known)) * sizes[stage] for stage, costs in cached.items()}
     done, evaluated = 0.0, list[Evaluated]()
     with shown(progress, "searching") as advance:
         for sample in samples.values():
@@ -145,9 +144,9 @@ def search(
             result = np.empty(len(candidates))
             size = 1 if problem.physical else len(candidates)  # physical walks are slow: cache each cost at once
             for i in range(0, len(candidates), size):
-                known = cached[stage].known
+                known = len(cached[stage].known)
                 result[i : i + size] = cached[stage](candidates[i : i + size])
-                new = (cached[stage].known - known) * sizes[stage] / sum(work.values())
+                new = (len(cached[stage].known) - known) * sizes[stage] / sum(work.values())
                 done += new
                 if advance and new:
                     advance(new)
@@ -167,8 +166,41 @@ def search(
         last.check_walks(best, threads)
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
     course = course.assign_attrs(settings=settings)
-    replayed = sum(values.replayed for values in cached.values())
-    return Found(best, cost, last.n_starts, course, replayed)
+    return Found(best, cost, last.n_starts, course)
+
+
+class CachedCosts:
+    """The costs of a stage, each computed once and cached as a line of a text file, so that a stopped search resumes.
+
+    A line is a JSON list of the parameters and the cost. An incomplete line, left by a killed process, is ignored.
+    """
+
+    def __init__(self, stage: str, sample: Sample, folder: Path | str | None, threads: int | None, fresh: bool) -> None:
+        """Read the costs that are cached in the folder, or discard them if `fresh`; None caches nothing."""
+        self._sample, self._threads, self._path = sample, threads, None
+        self.known: dict[tuple[float, ...], float] = {}
+        """Parameters -> cost."""
+        if folder is None:
+            return
+        cell = Cell(stage, sample.costs, {})
+        self._path = results_folder(folder) / f"{cell.stem(cell.record())}.txt"
+        if fresh:
+            self._path.unlink(missing_ok=True)
+        for line in self._path.read_text().splitlines() if self._path.exists() else ():
+            with suppress(ValueError):
+                *parameters, cost = json.loads(line)
+                self.known[tuple(parameters)] = cost
+
+    def __call__(self, candidates: np.ndarray) -> np.ndarray:
+        """Return the costs, (candidate,), of candidates, (candidate, parameter); only new candidates walk."""
+        rows = [tuple(candidate) for candidate in candidates.tolist()]
+        if new := [row for row in dict.fromkeys(rows) if row not in self.known]:
+            costs = self._sample.costs(np.array(new), self._threads).tolist()
+            self.known |= zip(new, costs, strict=True)
+            if self._path:
+                with self._path.open("a") as file:
+                    file.writelines(f"\n{json.dumps([*row, self.known[row]])}\n" for row in new)
+        return np.array([self.known[row] for row in rows])
 
 
 Evaluated = tuple[str, np.ndarray, np.ndarray]
