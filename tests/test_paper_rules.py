@@ -129,8 +129,7 @@ def test_observation_times_are_judged_separately():
     claim = Claim("a", "5", "slow", "< 0.05", Band(Losses("hws"), (0.1, 0.3), most=0.05), why="why")
     row = Row(claim, claim.answers(Measured({"hws": lost})))
     assert {time: verdict(answer) for time, answer in row.answers.items()} == {"walk": "differs", "start": "agrees"}
-    assert (row.fits, row.why) == ("start", "why")
-    assert "start 1" in summary([row])[-1]
+    assert row.why == "why"
 
 
 def test_calibrated_claims_are_counted_separately():

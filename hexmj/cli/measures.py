@@ -26,8 +26,6 @@ AGREE = """\
 agree: fraction of starts with both a kinematic loss and a fall, or neither; dynamic: with a dynamic loss instead
 both, only kinematic, only physical, none: starts with both a kinematic loss and a fall, one of them, or neither"""
 
-PLAIN = "plain walks: number of walks that random starts would need for an interval of this width"
-
 FREQUENCIES = {"kinematic": "kinematic FLSS", "dynamic": "FLDS", "physical": "frequency of falls"}
 """Measure of `hexmj flss` -> name of its frequency."""
 
@@ -119,8 +117,6 @@ class Flss(StudyCommand):
         measure = getattr(study, "measure", "physical")
         yield FREQUENCIES[measure]
         yield grid(result, ("velocity",), columns)
-        if "walks" in result:
-            yield PLAIN
         yield "low, high: 95 % interval; duration: observation time [time units]"
         if measure == "physical":
             yield report_line(physical_report(result))
@@ -149,10 +145,11 @@ class Compare(StudyCommand):
         from hexmj.plotting import MEASURE_STYLES
 
         axes = ("controller", *axes_of(result), "velocity")
-        counts = [name for name in (*AGREEMENT, "walks", "plain_walks") if name in result]
+        counts = [name for name in (*AGREEMENT, "walks") if name in result]
         yield "Frequency of losses of stability and of falls, with 95 % intervals"
         yield grid(result, axes, ("duration", *MEASURES))
         yield "; ".join(style["label"] for style in MEASURE_STYLES.values())
         yield grid(result, axes, ("agreement", "dynamic_agreement", *counts))
-        yield AGREE if study.precision is None else PLAIN
+        if study.precision is None:
+            yield AGREE
         yield report_line(physical_report(result))

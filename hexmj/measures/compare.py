@@ -171,7 +171,7 @@ class Comparison(Study):
             table = _counted(over_axes(sizes, data))
         else:
             samples, _ = self._sampled(data, self.precision)
-            table = over_axes(sizes, [sample.table(self.narrowed) for sample in samples], join="outer", data_vars="all")
+            table = over_axes(sizes, [sample.table() for sample in samples], join="outer", data_vars="all")
         starts = draw_starts(self.n_starts, self.seed, self.stride)[table.get_index("start")]
         own: Any = {name: (name, list(v), {"units": UNITS.get(name, "1")}) for name, v in self.axes.items()}
         table = table.assign_coords(
@@ -241,8 +241,7 @@ def compare(
         `kinematic_low`, ...), and `agreement`, the fraction of starts with a planned loss and a fall, or with neither;
         `dynamic_agreement` is that of the dynamic loss.
         Without a precision, the intervals are Wilson's, and there is the number of starts in each case of `AGREEMENT`.
-        With a precision, there are the number of `walks`, and `plain_walks`, the number that walks from all random
-        starts would need for the same intervals.
+        With a precision, there is the number of `walks`.
         Over (controller, *axes, velocity, start): every field of `physics.outcomes.Outcomes`; with a precision, only of
         the starts that have walked, with their `weight` in means over all starts.
 
@@ -272,7 +271,7 @@ def physical_flss(
 
     Returns:
         Over velocity: `flss`, the frequency of falls, the ends `low` and `high` of its 95 % interval, and the
-        observation time `duration` [time units]; with a precision, `walks` and `plain_walks`, see `compare`. Over
+        observation time `duration` [time units]; with a precision, the number of `walks`. Over
         (velocity, start): the time `fall`, and the outcomes `REPORTED`.
 
     Raises:
@@ -287,7 +286,7 @@ def physical_flss(
 
 def _falls(result: "xr.Dataset") -> "xr.Dataset":
     """Return the dataset of `physical_flss` from a comparison of one controller."""
-    kept = ("physical", "physical_low", "physical_high", "walks", "plain_walks", "weight", "fall", *REPORTED)
+    kept = ("physical", "physical_low", "physical_high", "walks", "weight", "fall", *REPORTED)
     falls = result.isel(controller=0, drop=True)[[name for name in kept if name in result]]
     falls = falls.rename(physical="flss", physical_low="low", physical_high="high").reset_coords("duration")
     return falls.assign_attrs(result.attrs | {"study": "flss"})

@@ -42,12 +42,11 @@ MOST = 12
 """Maximum number of panels of a comparison."""
 
 
-def caption(result: "xr.Dataset", least: int | None = None) -> str:
+def caption(result: "xr.Dataset") -> str:
     """Return a line for a figure's title: controllers, starts, observation time, V_p, and other settings.
 
     Fields of the stride and the conditions appear if they differ from their defaults. A condition that is a coordinate
-    of the result appears with the values of the coordinate instead of the recorded value. `least`, the minimum number
-    of starts behind any frequency of the figure, appears if it is below the number of all starts.
+    of the result appears with the values of the coordinate instead of the recorded value.
     """
     recorded = settings(result)
     words = [_controllers(recorded.get("controllers", {}), result)]
@@ -74,8 +73,6 @@ def caption(result: "xr.Dataset", least: int | None = None) -> str:
     shown = {name: given[name] for name in given if name in {"vp", *unusual(given)}}
     shown |= {name: axis.values for name, axis in result.coords.items() if axis.dims in ((), (name,))}
     words.append(", ".join(_term(name, shown[name]) for name in Conditions().settings() if name in shown))
-    if least not in (None, result.attrs.get("starts")):
-        words.append(f"frequencies of at least {least} of them")
     return "; ".join(filter(None, words))
 
 
@@ -105,29 +102,24 @@ def network_rules(controller: Any) -> str:
 def comparison_figure(result: "xr.Dataset") -> "Figure":
     """Draw a result of `compare`: frequencies against velocity with 95 % intervals, in at most `MOST` panels.
 
-    There is a panel for each controller and combination of other axes; with these, each controller begins a row.
+    There is a panel for each controller and combination of other axes.
     """
-    result, names = result.sortby("velocity"), result.controller.values
+    result = result.sortby("velocity")
     panels, shown = _panels(result), {name: style for name, style in MEASURE_STYLES.items() if name in result}
-    together = len(panels) // len(names) if len(panels) > len(names) else len(panels)  # panels that fill rows together
-    deep = -(-together // FEW)
-    columns, drawn = -(-together // deep), list(panels.items())[:MOST]
-    rows = deep * -(-len(drawn) // together)
+    drawn, combinations = list(panels.items())[:MOST], len(panels) // result.sizes["controller"]
+    columns = min(FEW, len(drawn), combinations if combinations > 1 else FEW)
+    rows = -(-len(drawn) // columns)
     figure = picture(max(7.0, 3.4 * columns), 1.6 + 2.9 * rows)
-    shifts, axes = np.linspace(-0.5, 0.5, len(shown)) * BESIDE, None
-    for number, (title, data) in enumerate(drawn):
-        place = 1 + number // together * deep * columns + number % together
-        axes = figure.add_subplot(rows, columns, place, sharey=axes)
+    every = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    for axes in every[len(drawn) :]:
+        axes.remove()
+    shifts = np.linspace(-0.5, 0.5, len(shown)) * BESIDE
+    for number, (axes, (title, data)) in enumerate(zip(every, drawn, strict=False)):
         for (measure, style), shift in zip(shown.items(), shifts, strict=True):
             frequency_curve(axes, data.velocity + shift, data, measure, **style)
         axes.set_title("\n".join(wrap(title, 36, break_long_words=False)), fontsize=11)
-        flss_axes(axes, result.velocity.values)
-        label = axes.get_xlabel()
-        axes.label_outer(remove_inner_ticks=False)
-        if number + columns >= len(drawn):  # there is no panel below
-            axes.tick_params(labelbottom=True)
-            axes.set_xlabel(label)
-    handles, _ = figure.axes[0].get_legend_handles_labels()
+        flss_axes(axes, result.velocity.values, "" if number % columns else "share of the starts")
+    handles, _ = every[0].get_legend_handles_labels()
     figure.legend(handles=handles, **LEGEND, loc="outside lower center", ncols=2)
     away = (abs(result[measure] - result.physical).mean().item() for measure in ("kinematic", "dynamic"))
     finding = "mean distance from the frequency of falls: kinematic FLSS {:.2f}, FLDS {:.2f}".format(*away)
@@ -171,8 +163,9 @@ def flss_figure(result: "xr.Dataset") -> "Figure":
 
 def _controllers(controllers: Mapping[str, Any], result: "xr.Dataset") -> str:
     """Return the names of at most `FEW` controllers, or of those that deviate from the paper, with their deviations."""
-    if axis := [result[name].values for name in ("controller", "entrant") if name in result.coords]:
-        controllers = {name: controllers[name] for name in np.ravel(axis[0]).tolist() if name in controllers}
+    if "controller" in result.coords:
+        names = np.ravel(result.controller.values).tolist()
+        controllers = {name: controllers[name] for name in names if name in controllers}
     few, rules = len(controllers) <= FEW, {name: network_rules(controllers[name]) for name in controllers}
     return ", ".join(in_figure(name) + f" ({words})" * bool(words) for name, words in rules.items() if words or few)
 

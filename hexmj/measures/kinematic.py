@@ -3,7 +3,7 @@
 FLDS is the frequency of the loss of dynamic stability, see `tipping`.  It depends on V_p and on the standing height.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -168,23 +168,16 @@ class KinematicFlss:
         """The velocities V_r and their observation times [time units], both (velocity,)."""
         return observed(self.velocities, self.observation_time, self.stride, self.acceleration)
 
-    @property
-    def places(self) -> Iterator[tuple[int, int]]:
-        """Pairs, in the order of the cells: index of the cell's velocity, and index of its first start."""
-        return product(range(len(self.velocities)), range(0, self.n_starts, self.range_of))
-
     def cells(self) -> list[Cell]:
         """Return a cell for each velocity and range of starts, computed by `losses_of_range`."""
         check_velocities(self.controller, self.velocities, self.stride, self.acceleration)
         cells = []
-        for i, first in self.places:
-            (v, duration), count = np.transpose(self.observed)[i], min(self.range_of, self.n_starts - first)
+        for (v, duration), first in product(np.transpose(self.observed), range(0, self.n_starts, self.range_of)):
+            count = min(self.range_of, self.n_starts - first)
             same = self.seed, self.conditions, self.stride, self.acceleration
             walks = WalkSettings(self.controller, v, duration, count, *same)
-            name = f"{self.controller.name}-V-{v:g}-from-{first}"
-            cells.append(
-                Cell(name, losses_of_range, {"walks": walks, "first": first, "measure": self.measure}, walks.work)
-            )
+            settings = {"walks": walks, "first": first, "measure": self.measure}
+            cells.append(Cell(f"{self.controller.name}-V-{v:g}-from-{first}", losses_of_range, settings, walks.work))
         return cells
 
     def result(self, data: Sequence["xr.Dataset"]) -> "xr.Dataset":

@@ -64,8 +64,6 @@ class Estimate(NamedTuple):
     value: float
     half: float
     """Half width of the 95 % interval."""
-    plain: float
-    """Number of walks from random starts that would give an interval of this width."""
     spread: np.ndarray
     """(stratum,) standard deviation of the event in each stratum, times the share of the stratum."""
     shared: float
@@ -106,11 +104,11 @@ class StratifiedWalks:
         used = walked > 0
         frequencies = happened / np.maximum(walked, 1)
         smooth = (happened + ADDED) / (walked + 2.0 * ADDED)  # so that no stratum is treated as certain
-        value, between = float(self._share @ frequencies), float(self._share @ smooth)
+        value = float(self._share @ frequencies)
         spread = self._share * np.sqrt(smooth * (1.0 - smooth))
         shared = float(self._share @ (frequencies - value) ** 2) / len(self._stratum)
         variance = float((spread[used] ** 2 / walked[used]).sum()) + shared
-        return Estimate(value, WILSON_Z * variance**0.5, between * (1.0 - between) / variance, spread, shared)
+        return Estimate(value, WILSON_Z * variance**0.5, spread, shared)
 
     def next_starts(self, narrowed: Mapping[str, str], precision: float) -> np.ndarray:
         """Return the starts that walk next, (n,), at most as many as have walked; none if all is precise.
@@ -142,25 +140,21 @@ class StratifiedWalks:
         wide = [one.wanted(precision) for one in estimates if one.half > precision]
         return np.max(wide, axis=0) if wide else np.zeros(STRATA)
 
-    def table(self, narrowed: Mapping[str, str]) -> "xr.Dataset":
-        """Return the outcomes and the weight of each walk over start, and all frequencies with their intervals.
-
-        `walks` is the number of walks, and `plain_walks` that of random walks for the same intervals of `narrowed`.
-        """
+    def table(self) -> "xr.Dataset":
+        """Return the outcomes and the weight of each walk over start, all frequencies, and the number of `walks`."""
         import xarray as xr
 
         table = xr.concat(self.batches, "start").assign_coords(start=self._starts)
-        estimates = {name: self.estimate(np.isfinite(self._times(outcome))) for name, outcome in MEASURES.items()}
         new: dict[str, Any] = {}
-        for name, (value, half, *_) in estimates.items():
-            if (outcome := MEASURES[name]) in self._plan:
+        for name, outcome in MEASURES.items():
+            if outcome in self._plan:
                 new |= frequency(name, np.isfinite(self._plan[outcome].values), ())
             else:
+                value, half, *_ = self.estimate(np.isfinite(self._times(outcome)))
                 new |= columns(name, (), *np.clip([value, value - half, value + half], 0.0, 1.0))
         for agreement, outcome in {"agreement": "planned_loss", "dynamic_agreement": "dynamic_loss"}.items():
             same = np.isfinite(self._times(outcome)) == np.isfinite(self._times("fall"))
             new[agreement] = self.estimate(same).value
         new["walks"] = len(self._starts)
-        new["plain_walks"] = max(estimates[name].plain for name in narrowed)
         new["weight"] = "start", (self._share / np.maximum(self._walked, 1))[self._stratum[self._starts]]
         return table.assign(new).sortby("start")

@@ -153,12 +153,6 @@ def claims() -> dict[str, Claim]:
     return {entry["key"]: _read(entry) for entry in read_toml(TABLE)["claim"]}
 
 
-@cache
-def in_physics() -> list[dict[str, str]]:
-    """Return topic, command and text of each statement that only physical walks can check."""
-    return read_toml(TABLE)["in_physics"]
-
-
 def _read(entry: dict[str, Any]) -> Claim:
     quantity, rule, calibrates = entry.pop("quantity"), entry.pop("rule"), tuple(entry.pop("calibrates", ()))
     judged_by = f"{_text(**quantity)}; {_text(**rule)}"

@@ -9,10 +9,9 @@ from typing import Any
 from hexmj.controllers.cruse1998 import MODEL_VARIANTS, PRESETS, Cruse1998, ModelVariant, Order, Symmetric
 from hexmj.files import read_toml
 from hexmj.paper.measurements import limit_regimes, losses, losses_after
-from hexmj.starts import MOST_STARTS, SAMPLE, checked_list
+from hexmj.starts import SAMPLE
 from hexmj.sweep import Cell
 from hexmj.timing import OBSERVATION_TIMES, Acceleration, Stride
-from hexmj.validate import whole
 
 PRINTED = MODEL_VARIANTS["printed"]  # the rules as the paper prints them
 
@@ -80,13 +79,6 @@ class Protocol:
     model_variant: ModelVariant = field(default_factory=ModelVariant)
     """Model variant of all networks."""
 
-    def __post_init__(self) -> None:
-        for name in ("velocities", "gait_velocities", "obstacle_velocities"):
-            checked_list(getattr(self, name))
-        for name in ("samples", "sample", "gait_starts", "obstacle_starts"):
-            whole(name, getattr(self, name), 1, MOST_STARTS)
-        whole("seed", self.seed, 0)
-
     def network(self, name: str, observation_time: str, velocity: float) -> Cruse1998 | None:
         """Return a network with this protocol's order and model variant; None if its weights were not searched yet.
 
@@ -119,25 +111,6 @@ QUICK = Protocol(
     obstacle_starts=20,
 )
 """Protocol with a tenth of the starts, about half of the velocities, and a coarser time step for gaits."""
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """Options of `hexmj reproduce`."""
-
-    quick: bool = False
-    """Use fewer starts and velocities: less than a minute. The full protocol takes several minutes."""
-    only: tuple[str, ...] = ()
-    """Keys of the claims to judge, without figures; by default all claims, with figures."""
-    beside: tuple[str, ...] = ()
-    """Names of model variants, such as 'lasting', under which the claims are judged too."""
-    seed: int = FULL.seed
-    """Seed of the random starts. The ideal sets were searched with seeds 0 and 1, for which their FLSS is too low."""
-
-    @property
-    def protocol(self) -> Protocol:
-        """The full or the quick protocol, with this seed."""
-        return replace(QUICK if self.quick else FULL, seed=self.seed)
 
 
 @dataclass(frozen=True)

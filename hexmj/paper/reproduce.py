@@ -12,7 +12,7 @@ from hexmj.controllers.cruse1998 import named_variant
 from hexmj.errors import InputError
 from hexmj.files import write_text
 from hexmj.measures.tables import VELOCITY
-from hexmj.paper.claims import Answer, Claim, claims, in_physics
+from hexmj.paper.claims import Answer, Claim, claims
 from hexmj.paper.figures import FIGURES, SAMPLES
 from hexmj.paper.protocol import FULL, MEASUREMENTS, Protocol, cells, searched_seeds
 from hexmj.paper.quantities import Measured
@@ -43,14 +43,6 @@ class Row:
     """Name of each further model variant -> answers under it."""
 
     @property
-    def fits(self) -> str:
-        """The observation time under which our value agrees, 'both' or 'neither'; '' without times or answers."""
-        if set(self.answers) == {""} or None in self.answers.values():
-            return ""
-        agreeing = [time for time, answer in self.answers.items() if answer and answer.agrees]
-        return "both" if len(agreeing) == len(OBSERVATION_TIMES) else next(iter(agreeing), "neither")
-
-    @property
     def why(self) -> str:
         """Known reason for a difference; '' if every answer agrees."""
         return self.claim.why if "differs" in map(verdict, self.answers.values()) else ""
@@ -67,7 +59,7 @@ class Row:
         if short:
             return claim.section, claim.text + "*" * bool(claim.calibrates), claim.value, *answered
         kind = ": ".join(filter(None, (claim.kind, "; ".join(claim.calibrates))))
-        return claim.key, claim.section, claim.text, claim.value, kind, *answered, self.fits, self.why
+        return claim.key, claim.section, claim.text, claim.value, kind, *answered, self.why
 
 
 def verdict(answer: Answer | None) -> str:
@@ -98,7 +90,7 @@ class Report:
         if short:
             heads = ("section", "the paper", "value", *(name.removeprefix("ours, ") for name in heads))
         else:
-            heads = ("key", "section", "the paper", "its value", "kind", *heads, "fits", "why")
+            heads = ("key", "section", "the paper", "its value", "kind", *heads, "why")
         return heads, [row.texts(short) for row in self.rows]
 
     @property
@@ -113,12 +105,11 @@ class Report:
         return lines
 
     def markdown(self) -> str:
-        """Return a Markdown document: the table, the rule of every claim, and what only physical walks can check."""
+        """Return a Markdown document: the table, and the rule of every claim."""
         p, (heads, rows) = self.protocol, self.table()
         size = f"{p.samples} times {p.sample} starts, gaits from {p.gait_starts} starts"
         rows = [[cell.replace("differs:", "**differs**:") for cell in row] for row in rows]
         rules = [(row.claim.key, row.claim.judged_by) for row in self.rows]
-        physical = [f"- {row['topic']} (Section 6): {row['text']}; `{row['command']}`" for row in in_physics()]
         lines = [
             "# The claims of the 1998 paper",
             "",
@@ -132,12 +123,6 @@ class Report:
             "## Rules",
             "",
             *io.markdown_table(("key", "quantity and rule"), rules),
-            "",
-            "## Judged in physics",
-            "",
-            "Kinematic walks cannot check these statements: see docs/results/paper.md.",
-            "",
-            *physical,
         ]
         return "\n".join(lines) + "\n"
 
@@ -149,8 +134,7 @@ class Report:
             paper = {"key": claim.key, "section": claim.section, "paper": claim.text, "value": claim.value}
             paper |= {"kind": claim.kind, "calibrates": list(claim.calibrates), "why": claim.why}
             beside = {name: _plain(answers) for name, answers in row.beside.items()}
-            ours = {"ours": _plain(row.answers), "beside": beside, "fits": row.fits}
-            rows.append(paper | {"rule": claim.judged_by} | ours)
+            rows.append(paper | {"rule": claim.judged_by, "ours": _plain(row.answers), "beside": beside})
         return {"claims": rows, "summary": self.summary, "protocol": asdict(self.protocol)}
 
 
@@ -226,9 +210,7 @@ def summary(rows: Sequence[Row]) -> list[str]:
             counts.append(f"{kind} {', '.join(some) or 'none judged'}")
         of = f"claims on FLSS and sets, observation time {time}" if time else "claims on gaits"
         lines.append(f"{of}: {'; '.join(counts)}")
-    fits = Counter(row.fits for row in rows)
-    counts = ", ".join(f"{name} {fits[name]}" for name in ("both", *OBSERVATION_TIMES, "neither"))
-    return [*lines, f"which observation time the paper's numbers fit: {counts}"]
+    return lines
 
 
 def _plain(answers: Answers) -> dict[str, dict[str, Any]]:

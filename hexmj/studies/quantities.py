@@ -36,10 +36,7 @@ WHOLE = {
     "phase, contralateral": "1",
     "vertical peaks: greatest over least": "1",
     "work of standing legs at the coxa-trochanter": "%",
-    **{f"{joint} torque against its movement": "% of stance" for joint in JOINTS},
     "pitch of the thorax": "deg",
-    "pitch, range over the strides": "deg",
-    "height of the centre of mass, range over the strides": "mm",
     "cost of transport, positive work": "1",
     "cost of transport, all work": "1",
     "positive work of the joints": "J/kg/m",
@@ -66,7 +63,7 @@ UNITS = WHOLE | {f"{name}, {segment}": unit for name, unit in EACH.items() for s
 """Quantity of the whole body or of one pair of legs -> its unit."""
 
 FRAME = 0.04
-"""Averaging time of speed, height and pitch, as in a film of 25 frames per second [s]."""
+"""Averaging time of speed and height, as in a film of 25 frames per second [s]."""
 
 PLATE = 0.01
 """Averaging time of forces and torques, as of a force plate [s]."""
@@ -256,13 +253,11 @@ def _torques(strides: Strides) -> dict[str, Any]:
     power, stands = torque * strides.turning.reshape(torque.shape), strides.standing[..., None]
     with np.errstate(invalid="ignore"):  # a leg that never stands gives 0 / 0
         mean = np.abs(torque).sum(axis=0, where=stands) / stands.sum(axis=0)
-    against = ((power < 0) & stands).sum(axis=(0, 1)) / strides.standing.sum()
     work = (np.maximum(power, 0.0) * stands).sum(axis=(0, 1))
     course = [_course(torque[:, leg, 1], strides, leg) for leg in range(6)]
     past = [np.flatnonzero(torques > 0.5 * torques.max()) for torques in course]
     return {
         **{f"{joint} torque": 1e-3 * legs for joint, legs in zip(JOINTS, mean.T, strict=True)},
-        **{f"{joint} torque against its movement": 100.0 * x for joint, x in zip(JOINTS, against, strict=True)},
         "work of standing legs at the coxa-trochanter": 100.0 * work[1] / work.sum(),
         "coxa-trochanter torque past half its peak, from": [rows[0] if len(rows) else np.nan for rows in past],
         "coxa-trochanter torque past half its peak, until": [rows[-1] if len(rows) else np.nan for rows in past],
@@ -283,7 +278,7 @@ def _course(torque: np.ndarray, strides: Strides, leg: int) -> np.ndarray:
 
 
 def _posture(strides: Strides) -> dict[str, Any]:
-    """Return the heights of coxae and centre of mass, and the pitch of the line from hind to front coxae."""
+    """Return the heights of the coxae, and the pitch of the line from hind to front coxae."""
     from hexmj.bodies.ground import ground_level
     from hexmj.bodies.kinematics import joint_numbers, posed
 
@@ -298,8 +293,6 @@ def _posture(strides: Strides) -> dict[str, Any]:
     return {
         "height of the coxae": (height - np.maximum(np.stack(below, axis=1), 0.0)).mean(axis=0),
         "pitch of the thorax": pitch.mean(),
-        "pitch, range over the strides": np.ptp(strides.averaged(pitch, FRAME)),
-        "height of the centre of mass, range over the strides": np.ptp(strides.averaged(strides.centre[:, 2], FRAME)),
     }
 
 
