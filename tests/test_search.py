@@ -17,7 +17,7 @@ from hexmj.errors import InputError
 from hexmj.search.forms import named_form
 from hexmj.search.problems import Sample
 from hexmj.search.results import run_search
-from hexmj.search.stages import CachedCosts, search
+from hexmj.search.stages import Stage, search
 from pace import Pace
 
 HWS = NetworkForm("hws")
@@ -97,15 +97,17 @@ WALKED: list[int] = []
 class Squares:
     """A sample whose costs are a third of the squares' sum."""
 
+    problem: Problem = PROBLEM
+
     def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
         WALKED.append(len(vectors))
         return (vectors**2).sum(axis=1) / 3
 
 
 def test_cached_costs_have_the_same_bits_and_lose_at_most_a_torn_line(tmp_path: Path):
-    def cached() -> CachedCosts:
+    def cached() -> Any:
         sample: Any = Squares()
-        return CachedCosts("population", sample, tmp_path, None, fresh=False)
+        return Stage("population", sample, tmp_path, fresh=False).costs
 
     rows = np.random.default_rng(1).standard_normal((20, 9))
     first, direct = cached(), (rows**2).sum(axis=1) / 3

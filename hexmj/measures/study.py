@@ -42,9 +42,9 @@ class Study:
         check_draw(self.n_starts, self.seed)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def settled_starts(n_starts: int, seed: int, conditions: Conditions, stride: Stride, threads: int | None) -> "Settled":
-    """Return the random starts of a seed after they have come to rest; cached, since all controllers share them."""
+    """Return the random starts of a seed after they have come to rest; cached, since controllers share them."""
     from hexmj.physics.settle import settle
 
     return settle(draw_starts(n_starts, seed, stride), conditions, stride, threads)

@@ -12,6 +12,7 @@ from hexmj.controllers.feedback import SensoryFeedback
 from hexmj.controllers.protocol import Controller
 from hexmj.errors import InputError, OutOfReach, Refused, SimulationError
 from hexmj.measures.kinematic import dynamic_losses, first_loss
+from hexmj.measures.study import settled_starts
 from hexmj.measures.tables import Measure, columns, observed
 from hexmj.plain import plain
 from hexmj.progress import Progress, part_of
@@ -148,17 +149,13 @@ class Sample:
         """(start,) velocity V_r of each start, as a fraction of V_p."""
         return np.random.default_rng([self.seed, 1]).uniform(self.problem.low, self.problem.high, self.n_starts)
 
-    @cached_property
-    def _settled(self) -> "list[Settled]":
-        return []
-
     def settle(self, threads: int | None = None) -> None:
         """For physical walks, let the body settle at all starts; raise SimulationError if it does not come to rest."""
-        from hexmj.physics.settle import settle
+        for one in self.variants.values() if self.problem.physical else ():
+            one._settled(threads)
 
-        for one in self.variants.values():
-            if one.problem.physical and not one._settled:
-                one._settled.append(settle(one.starts, one.problem.conditions, one.problem.stride, threads))
+    def _settled(self, threads: int | None) -> "Settled":
+        return settled_starts(self.n_starts, self.seed, self.problem.conditions, self.problem.stride, threads)
 
     def costs(self, vectors: np.ndarray, threads: int | None = None) -> np.ndarray:
         """Return the cost of each candidate, (candidate,), from the parameters, (candidate, parameter)."""
@@ -228,7 +225,7 @@ class Sample:
         if p.physical:
             from hexmj.measures.physical import physical_outcomes
 
-            (settled,) = self._settled
+            settled = self._settled(threads)
             lost = physical_outcomes(settled, controller, self.velocity, float(ends.max()), **how).fall
         elif p.measure == "dynamic":
             walks = self.starts, controller, self.velocity, ends

@@ -1,5 +1,6 @@
 """A search, the FLSS of its result on fresh starts, and its files: found.toml, the history and a figure."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +15,6 @@ from hexmj.controllers.registry import parameter_file, searched_on
 from hexmj.errors import InputError
 from hexmj.files import read_toml, write_text
 from hexmj.io import save, save_figure
-from hexmj.plain import plain
 from hexmj.plotting import LEGEND, as_shipped, head, in_figure, picture, tidy
 from hexmj.progress import shown
 from hexmj.search.forms import FieldsForm, NetworkForm
@@ -47,9 +47,7 @@ class Result:
     @property
     def settings(self) -> dict[str, Any]:
         """Problem and effort as plain data, which can be written as JSON."""
-        effort = plain(self.effort)
-        fresh = {name: effort.pop(name) for name in ("verdict_starts", "verdict_seed")}
-        return {"problem": self.problem.settings(), "effort": effort} | fresh
+        return json.loads(self.found.history.attrs["settings"])
 
     def summary(self) -> dict[str, Any]:
         """Return parameters, cost, verdict and settings as plain data, which can be written as JSON."""

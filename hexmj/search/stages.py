@@ -16,8 +16,8 @@ from hexmj.controllers.registry import load_controller
 from hexmj.errors import without_extra
 from hexmj.io import results_folder
 from hexmj.plain import plain
-from hexmj.progress import Progress, shown
-from hexmj.search.algorithms import CovarianceAdaptation, Evolution, refine, search_population
+from hexmj.progress import Progress, part_of, shown
+from hexmj.search.algorithms import Costs, CovarianceAdaptation, Evolution, refine, search_population
 from hexmj.search.problems import REFUSED, Problem, Sample
 from hexmj.starts import SAMPLE, check_draw
 from hexmj.sweep import Cell
@@ -129,60 +129,50 @@ def search(
     """
     effort = effort.completed(physical=problem.physical)
     domain = problem.domain(effort.domain, effort.beginning)
-    budgets = dict(zip(STAGES, (effort.budget, effort.refine_budget), strict=True))
-    sizes = dict(zip(STAGES, (effort.starts or 0, effort.refine_starts or 0), strict=True))
-    samples = {stage: Sample(problem, sizes[stage], effort.seed) for stage in STAGES if budgets[stage]}
-    cached = {stage: CachedCosts(stage, sample, folder, threads, fresh) for stage, sample in samples.items()}
-    work = {stage: max(1, budgets[stage] - len(costs.known)) * sizes[stage] for stage, costs in cached.items()}
-    done, evaluated = 0.0, list[Evaluated]()
+    sizes = {
+        "population": (effort.starts or 0, effort.budget),
+        "simplex": (effort.refine_starts or 0, effort.refine_budget),
+    }
+    work = sum(n_starts * budget for n_starts, budget in sizes.values())
+    stages, costs = list[Stage](), dict[str, Costs]()
     with shown(progress, "searching") as advance:
-        for sample in samples.values():
-            sample.settle(threads)
-
-        def costs(stage: str, candidates: np.ndarray) -> np.ndarray:
-            nonlocal done
-            result = np.empty(len(candidates))
-            size = 1 if problem.physical else len(candidates)  # physical walks are slow: cache each cost at once
-            for i in range(0, len(candidates), size):
-                known = len(cached[stage].known)
-                result[i : i + size] = cached[stage](candidates[i : i + size])
-                new = (len(cached[stage].known) - known) * sizes[stage] / sum(work.values())
-                done += new
-                if advance and new:
-                    advance(new)
-            evaluated.append((stage, candidates.copy(), result))
-            return result
-
+        for name, (n_starts, budget) in sizes.items():
+            if budget:
+                stages.append(Stage(name, Sample(problem, n_starts, effort.seed), folder, fresh))
+                stages[-1].sample.settle(threads)
+                evaluated = part_of(advance, n_starts / work)
+                costs[name] = partial(stages[-1].costs, threads=threads, progress=evaluated)
+                if evaluated and stages[-1].known:
+                    evaluated(min(len(stages[-1].known), budget))
         algorithm = Evolution if effort.algorithm == "evolution" else CovarianceAdaptation
         searcher = algorithm(domain, effort.population, effort.seed)
-        best, cost = search_population(searcher, partial(costs, "population"), effort.budget)
+        best, cost = search_population(searcher, costs["population"], effort.budget)
         if effort.refine_budget:
-            best, cost = refine(best, ~domain.binary, partial(costs, "simplex"), effort.refine_budget, domain.unit)
-        if advance:
-            advance(1.0 - done)
-    course = history(evaluated, problem.form.names, problem.minimised)
-    last = list(samples.values())[-1]
+            best, cost = refine(best, ~domain.binary, costs["simplex"], effort.refine_budget, domain.unit)
+    last = stages[-1].sample
     if cost >= REFUSED:
         last.check_walks(best, threads)
+    course = history([one for stage in stages for one in stage.evaluated], problem.form.names, problem.minimised)
     settings = json.dumps({"problem": problem.settings(), "effort": plain(effort)}, sort_keys=True)
-    course = course.assign_attrs(settings=settings)
-    return Found(best, cost, last.n_starts, course)
+    return Found(best, cost, last.n_starts, course.assign_attrs(settings=settings))
 
 
-class CachedCosts:
-    """The costs of a stage, each computed once and cached as a line of a text file, so that a stopped search resumes.
+class Stage:
+    """The evaluations of a stage. Each cost is cached as a line of a text file, so that a stopped search resumes.
 
     A line is a JSON list of the parameters and the cost. An incomplete line, left by a killed process, is ignored.
     """
 
-    def __init__(self, stage: str, sample: Sample, folder: Path | str | None, threads: int | None, fresh: bool) -> None:
+    def __init__(self, name: str, sample: Sample, folder: Path | str | None, fresh: bool) -> None:
         """Read the costs that are cached in the folder, or discard them if `fresh`; None caches nothing."""
-        self._sample, self._threads, self._path = sample, threads, None
+        self.name, self.sample, self._path = name, sample, None
         self.known: dict[tuple[float, ...], float] = {}
         """Parameters -> cost."""
+        self.evaluated = list[Evaluated]()
+        """All evaluations of this run, in order."""
         if folder is None:
             return
-        cell = Cell(stage, sample.costs, {})
+        cell = Cell(name, sample.costs, {})
         self._path = results_folder(folder) / f"{cell.stem(cell.record())}.txt"
         if fresh:
             self._path.unlink(missing_ok=True)
@@ -191,16 +181,25 @@ class CachedCosts:
                 *parameters, cost = json.loads(line)
                 self.known[tuple(parameters)] = cost
 
-    def __call__(self, candidates: np.ndarray) -> np.ndarray:
-        """Return the costs, (candidate,), of candidates, (candidate, parameter); only new candidates walk."""
+    def costs(self, candidates: np.ndarray, threads: int | None = None, progress: Progress | None = None) -> np.ndarray:
+        """Return the costs, (candidate,), of candidates, (candidate, parameter); only new candidates walk.
+
+        `progress` is called with the number of new candidates that have walked.
+        """
         rows = [tuple(candidate) for candidate in candidates.tolist()]
-        if new := [row for row in dict.fromkeys(rows) if row not in self.known]:
-            costs = self._sample.costs(np.array(new), self._threads).tolist()
-            self.known |= zip(new, costs, strict=True)
+        new = [row for row in dict.fromkeys(rows) if row not in self.known]
+        size = 1 if self.sample.problem.physical else len(rows)  # physical walks are slow: cache each cost at once
+        for i in range(0, len(new), size):
+            part = new[i : i + size]
+            self.known |= zip(part, self.sample.costs(np.array(part), threads).tolist(), strict=True)
             if self._path:
                 with self._path.open("a") as file:
-                    file.writelines(f"\n{json.dumps([*row, self.known[row]])}\n" for row in new)
-        return np.array([self.known[row] for row in rows])
+                    file.writelines(f"\n{json.dumps([*row, self.known[row]])}\n" for row in part)
+            if progress:
+                progress(len(part))
+        costs = np.array([self.known[row] for row in rows])
+        self.evaluated.append((self.name, candidates.copy(), costs))
+        return costs
 
 
 Evaluated = tuple[str, np.ndarray, np.ndarray]
