@@ -160,10 +160,6 @@ def _controller_toml(problem: Problem, vector: np.ndarray) -> str:
     return tomli_w.dumps({"controller": table["controller"], "fields": values})
 
 
-FREQUENCIES = ("FLSS", "FLDS")
-"""Costs that are frequencies and need no explanation."""
-
-
 def convergence_figure(history: "xr.Dataset") -> "Figure":
     """Draw the costs of all candidates and the lowest cost so far over the evaluations, from `stages.history`."""
     figure, found = picture(8.0, 4.6), []
@@ -178,14 +174,8 @@ def convergence_figure(history: "xr.Dataset") -> "Figure":
             axes.text(evaluation[0], 1.0, f" {stage}", va="top", fontsize=10)
             found.append(f"{part.best.values[0]:.2f} to {part.best.values[-1]:.2f} in the {stage}")
     cost = history.cost.attrs["long_name"]
-    label = f"{cost if cost in FREQUENCIES else 'cost'} on the starts of the stage"
-    axes.set(xlabel="evaluations of the cost function", ylabel=label, ylim=(-0.02, 1.02))
-    head(
-        figure,
-        f"lowest {label.split()[0]} so far: {', '.join(found)}",
-        in_figure(history.attrs["title"]),
-        "" if cost in FREQUENCIES else f"cost: {cost}",
-    )
+    axes.set(xlabel="evaluations of the cost function", ylabel="cost on the starts of the stage", ylim=(-0.02, 1.02))
+    head(figure, f"lowest cost so far: {', '.join(found)}", in_figure(history.attrs["title"]), f"cost: {cost}")
     tidy(axes)
     figure.legend(loc="outside lower center", ncols=2, **LEGEND)
     return figure

@@ -175,11 +175,7 @@ class Biology(Study):
     """Number of periods of a single leg that each start walks; the last three are measured."""
     n_starts: int = field(default=20, kw_only=True)
 
-    hidden: ClassVar[tuple[str, ...]] = (
-        "grasp",
-        "ground",
-        *(f"ground_{end}" for end in ("height", "at", "length", "seed")),
-    )
+    hidden: ClassVar = ("grasp", "ground", "ground_height", "ground_at", "ground_length", "ground_seed")
     """Conditions without an option of the command."""
 
     def __post_init__(self) -> None:
