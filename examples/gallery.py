@@ -32,7 +32,7 @@ def walked(name: str, velocity: float | hexmj.Command, duration: float, **condit
 def on_command(task: str, *names: str) -> list[Dataset]:
     """Record a walk of each controller by the command of a task."""
     settings = hexmj.load_task(task)
-    return [walked(name, settings.command, settings.duration) for name in names]
+    return [walked(name, settings.command, float(settings.duration)) for name in names]
 
 
 def planned(name: str, velocity: float, duration: float) -> Dataset:

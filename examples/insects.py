@@ -65,7 +65,7 @@ def draw_steps() -> Figure:
 
 def pushed() -> xr.Dataset:
     """Let LDVS walk with pushes of all impulses to the left."""
-    tasks = [Task(f"{i:g}", V, events=[Push(impulse=i * V)], duration=100.0) for i in IMPULSES]
+    tasks = [Task(f"{i:g}", V, events=(Push(impulse=i * V),), duration=100.0) for i in IMPULSES]
     return hexmj.run_task(tasks, hexmj.LDVS, n_starts=2 * N_STARTS).isel(controller=0)
 
 

@@ -167,8 +167,8 @@ class Overlay:
 
     def _diagram(self, width: int, height: int, bars: bool) -> np.ndarray:
         """Return the diagram, with or without bars and the line of the first loss, (height, width, 3)."""
-        take, size = self._take, np.array([width, height])
-        figure = Figure(size / 72, dpi=72, facecolor=[part / 255 for part in PAPER])
+        take = self._take
+        figure = Figure((width / 72, height / 72), dpi=72, facecolor="#" + bytes(PAPER).hex())
         left, right, bottom = self._left / width, self._right / width, 1 - self._pixels(BARS) / height
         axes = figure.add_axes((left, bottom, right - left, 1 - bottom), facecolor="none", frameon=False)
         axes.set(xlim=(1000 * self._begin, 1000 * self._end), ylim=(6.0, -0.3), yticks=np.arange(6) + 0.5)

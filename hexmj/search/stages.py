@@ -14,7 +14,6 @@ import numpy as np
 from hexmj.controllers.protocol import Controller
 from hexmj.controllers.registry import load_controller
 from hexmj.errors import without_extra
-from hexmj.io import results_folder
 from hexmj.plain import plain
 from hexmj.progress import Progress, part_of, shown
 from hexmj.search.algorithms import Costs, CovarianceAdaptation, Evolution, refine, search_population
@@ -173,7 +172,8 @@ class Stage:
         if folder is None:
             return
         cell = Cell(name, sample.costs, {})
-        self._path = results_folder(folder) / f"{cell.stem(cell.record())}.txt"
+        self._path = Path(folder) / f"{cell.stem(cell.record())}.txt"
+        self._path.parent.mkdir(parents=True, exist_ok=True)
         if fresh:
             self._path.unlink(missing_ok=True)
         for line in self._path.read_text().splitlines() if self._path.exists() else ():
