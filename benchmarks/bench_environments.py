@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from hexmj import LDVS, Stride, draw_starts
-from hexmj.environments.gym import StickInsect
+from hexmj.environments.gym import StickInsect, StickInsects
 from hexmj.environments.task import Task
-from hexmj.environments.vector import StickInsects
 from hexmj.measures.physical import physical_outcomes
 from hexmj.physics.settle import settle
 
@@ -19,19 +18,14 @@ MANY, FEW_STEPS = 1000, 100
 
 
 @pytest.mark.parametrize(("actions", "dt"), [("joints", 0.1), ("tips", 0.1), ("tips", 0.5)])
-@pytest.mark.parametrize("who", ["hexmj", "bare mj_step, the same controls", "the dm_env interface"])
+@pytest.mark.parametrize("who", ["hexmj", "bare mj_step, the same controls"])
 def test_one(measure, who, actions, dt):
     """One insect that walks, or stands where its joints do not move; the bare loop only steps."""
-    pytest.importorskip("dm_control", reason="dm_control needs Python below 3.13")
-    from hexmj.environments import dm
-
     task = Task(VELOCITY, actions, stride=Stride(dt=dt), duration=1e5)
-    walking, other = StickInsect(**vars(task)), dm.load(**vars(task))
-    controls, data = [], mujoco.MjData(walking.model)
+    walking, controls = StickInsect(**vars(task)), []
+    data = mujoco.MjData(walking.model)
     walking.reset(seed=0)
-    other.reset()
     mujoco.mj_copyData(data, walking.model, walking.data)
-    still = other.physics.compiled.home[7:] if actions == "joints" else np.zeros(18)
     for _ in range(STEPS):
         walking.step(np.zeros(18))
         controls.append(walking.data.ctrl.copy())
@@ -40,10 +34,6 @@ def test_one(measure, who, actions, dt):
         for _ in range(STEPS):
             walking.step(np.zeros(18))
 
-    def dm_env() -> None:
-        for _ in range(STEPS):
-            other.step(still)
-
     def bare() -> None:
         control, substeps = data.ctrl, task.substeps
         for now in controls:
@@ -51,7 +41,7 @@ def test_one(measure, who, actions, dt):
             for _ in range(substeps):
                 mujoco.mj_step(walking.model, data)
 
-    work = {"hexmj": ours, "the dm_env interface": dm_env}.get(who, bare)
+    work = ours if who == "hexmj" else bare
     what = f"environment, 1 insect, {actions}, {task.substeps} substeps"
     measure(work, what, who, amount=STEPS, unit="steps/s", ratio=0.5, rounds=7)
 

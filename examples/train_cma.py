@@ -53,7 +53,7 @@ def costs(candidates: np.ndarray, seed: int) -> np.ndarray:
 
     An insect with more than `MOST_LOST` of its tips out of reach counts as fallen.
     """
-    from hexmj.environments.vector import StickInsects  # the learned controller walks without Gymnasium
+    from hexmj.environments.gym import StickInsects  # the learned controller walks without Gymnasium
 
     count = len(candidates) * STARTS
     walking = StickInsects(count, actions="tips", velocity=VELOCITY, duration=DURATION, autoreset_mode="Disabled")

@@ -9,6 +9,7 @@ import json
 import time
 from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -55,19 +56,53 @@ def reward(walked: np.ndarray, felt: np.ndarray, fell: np.ndarray) -> np.ndarray
     return walked - TIPPING * np.minimum(felt[:, TURNING][:, 1] ** 2, 9.0) - FALL * fell
 
 
+def held(insects: Any) -> Any:
+    """Return an environment whose action, the gains, is held for `HELD` steps and earns the mean of their rewards.
+
+    Its observation is constant. After the end of its episode, an insect earns nothing until the next action.
+    """
+    from gymnasium.spaces import Box
+    from stable_baselines3.common.vec_env import VecEnvWrapper
+
+    class Held(VecEnvWrapper):
+        seen = np.ones((insects.num_envs, 1), np.float32)
+
+        def reset(self) -> np.ndarray:
+            self.felt = self.venv.reset()
+            return self.seen
+
+        def step_async(self, actions: np.ndarray) -> None:
+            self.gains = actions.astype(float)
+
+        def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+            earned, done = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
+            infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+            for _ in range(HELD):
+                self.felt, walked, ends, ended = self.venv.step(offsets(self.gains, self.felt))
+                last, fell = np.array(self.felt), ends.copy()
+                for i in np.flatnonzero(ends).tolist():
+                    last[i], fell[i] = ended[i]["terminal_observation"], not ended[i]["TimeLimit.truncated"]
+                    infos[i] = infos[i] or ended[i] | {"terminal_observation": self.seen[i]}
+                earned += ~done * reward(walked, last, fell)
+                done |= ends
+            return self.seen, (earned / HELD).astype(np.float32), done, infos
+
+    return Held(insects, Box(0.0, 1.0, (1,)), Box(-1.0, 1.0, (4,)))
+
+
 def main() -> None:
     """Learn the gains, write them, and compare them with LDVS."""
     import torch
     from stable_baselines3 import PPO
 
-    from hexmj.environments.stable_baselines import FeltInsects, HeldInsects
+    from hexmj.environments.stable_baselines import FeltInsects
 
     torch.set_num_threads(1)  # more threads add in another order and find other gains
     began, cpu = time.monotonic(), time.process_time()
     insects = FeltInsects(INSECTS, velocity=VELOCITY, duration=DURATION, stride=STRIDE)
     size, net = INSECTS * ACTIONS, {"net_arch": [], "log_std_init": float(np.log(SPREAD))}
     agent = PPO(
-        "MlpPolicy", HeldInsects(insects, 4, HELD, offsets, reward), policy_kwargs=net, n_steps=ACTIONS,
+        "MlpPolicy", held(insects), policy_kwargs=net, n_steps=ACTIONS,
         batch_size=size, n_epochs=10, gamma=0.9, gae_lambda=0.9, learning_rate=1e-2, seed=1, device="cpu",
     )  # fmt: skip
     agent.policy.log_std.requires_grad = False

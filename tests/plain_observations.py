@@ -3,16 +3,17 @@
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.environments.observing import Places, Planned
 from hexmj.environments.task import Task, observation_bounds
 from hexmj.stability import stability_margin
 
+State = tuple[np.ndarray, ...]
+
 
 def plain_observations(
-    places: Places, standing: np.ndarray, planned: Planned, compiled: CompiledBody, task: Task
+    state: State, standing: np.ndarray, planned: State, compiled: CompiledBody, task: Task
 ) -> dict[str, np.ndarray]:
-    """What some insects observe, each (n, ...) in its shape, by name; `standing` says which feet do, (n, leg)."""
-    qpos, qvel, rotation, sensors = places
+    """Return the observations of n insects, from `Walkers.state`, standing feet, (n, leg), and `Walkers.planned`."""
+    (qpos, qvel, rotation, sensors), (stance, tips, missed) = state, planned
     columns = compiled.columns
     feet = sensors[:, columns.foot].reshape(-1, 6, 3)
     around = feet - sensors[:, np.newaxis, columns.centre_of_mass]
@@ -32,15 +33,16 @@ def plain_observations(
         "contact": standing.astype(float),
         "margin": np.maximum(margin, compiled.body.lengths.no_foot_margin)[:, np.newaxis],
         "command": np.full((len(qpos), 1), task.command),
-        "planned_stance": planned.stance,
-        "planned_tips": planned.tips,
-        "out_of_reach": planned.missed,
+        "planned_stance": stance,
+        "planned_tips": tips,
+        "out_of_reach": missed,
     }
     bounds = observation_bounds(compiled, task)
     return {name: np.clip(observed[name], low, high) for name, (low, high) in bounds.items()}
 
 
-def plain_rewards(places: Places, fell: np.ndarray, task: Task) -> np.ndarray:
+def plain_rewards(state: State, fell: np.ndarray, task: Task) -> np.ndarray:
     """max(0, 1 - |v - c| / c) max(0, u), and 0 on a fall, (n,)."""
-    off = np.abs(places.qvel[:, 0] - task.command) / task.command
-    return np.maximum(1.0 - off, 0.0) * np.maximum(places.rotation[:, 2, 2], 0.0) * ~fell
+    _, qvel, rotation, _ = state
+    off = np.abs(qvel[:, 0] - task.command) / task.command
+    return np.maximum(1.0 - off, 0.0) * np.maximum(rotation[:, 2, 2], 0.0) * ~fell

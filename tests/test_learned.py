@@ -13,7 +13,7 @@ import hexmj
 from hexmj.conditions import Conditions
 from hexmj.controllers.conformance import check_controller
 from hexmj.environments.gym import StickInsect
-from hexmj.environments.learned import FELT, MOST, TILT, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt, felt_in
+from hexmj.environments.learned import FELT, MOST, TIPS, VELOCITY, OffsetPlan, WithOffsets, felt, felt_in
 from hexmj.errors import InputError
 
 STARTS = hexmj.draw_starts(5, 0)
@@ -179,52 +179,9 @@ def insects():
 
 
 @pytest.mark.slow
-def test_an_action_is_held_and_rewarded_until_the_first_end(insects):
-    """An episode of 3 steps ends within an action of 4 steps; the fourth belongs to the next episode."""
-    calls = []
-
-    def still(actions: np.ndarray, felt: np.ndarray) -> np.ndarray:
-        calls.append(actions)
-        return np.zeros((len(felt), 18))
-
-    felt_insects = insects.FeltInsects(2, velocity=0.3, duration=0.3)
-    held = insects.HeldInsects(felt_insects, 5, 4, still, lambda walked, felt, fell: np.ones(len(walked)))
-    assert held.reset().shape == (2, 1)
-    seen, reward, done, infos = held.step(np.full((2, 5), 0.5))
-    assert len(calls) == 4 and calls[0].shape == (2, 5) and seen.shape == (2, 1)
-    np.testing.assert_array_equal(reward, 0.75)
-    assert done.all() and all(info["TimeLimit.truncated"] and info["terminal_observation"] == 1 for info in infos)
-    with pytest.raises(InputError, match="action"):
-        held.step(np.full((2, 5), 1.5))
-
-
-@pytest.mark.slow
 def test_attributes_and_methods_are_those_of_all_insects(insects):
     felt_insects = insects.FeltInsects(3)
     assert len(felt_insects.env_method("reset")) == len(felt_insects.get_attr("task")) == 3
-    with pytest.raises(InputError, match="indices"):
-        felt_insects.env_method("reset", indices=[0])
-
-
-@pytest.mark.slow
-def test_a_fall_is_rewarded_by_what_was_sensed_at_its_end(insects):
-    felt_insects, fallen = insects.FeltInsects(2, velocity=0.5), []
-
-    def leaning(felt: np.ndarray) -> list[float]:
-        return np.abs(felt[:, TILT]).max(axis=1).tolist()
-
-    def reward(walked: np.ndarray, felt: np.ndarray, fell: np.ndarray) -> np.ndarray:
-        fallen.extend(leaning(felt[fell]))
-        return walked
-
-    def front_up_hind_down(actions: np.ndarray, felt: np.ndarray) -> np.ndarray:
-        return np.tile([0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(felt), 2))
-
-    held = insects.HeldInsects(felt_insects, 1, 100, front_up_hind_down, reward)
-    held.reset()
-    for _ in range(5):
-        held.step(np.zeros((2, 1)))
-    assert fallen and min(fallen) > max(leaning(felt_insects.reset()))
 
 
 def test_without_stable_baselines_the_error_names_the_extra(monkeypatch):

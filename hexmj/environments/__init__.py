@@ -1,4 +1,4 @@
-"""Environments for learning and control: `dm` for dm_env, `gym` and `vector` for Gymnasium, and `stable_baselines`.
+"""Environments for learning and control: `dm` for dm_env, `gym` for Gymnasium, and `stable_baselines`.
 
 Importing this package registers the ids of `IDS` if Gymnasium is installed. The prefix in
 `gymnasium.make("hexmj.environments:hexmj/StickInsect-v0")` makes Gymnasium import it.
@@ -16,6 +16,6 @@ else:
         register(
             _id,
             entry_point="hexmj.environments.gym:StickInsect",
-            vector_entry_point="hexmj.environments.vector:StickInsects",
+            vector_entry_point="hexmj.environments.gym:StickInsects",
             kwargs={"actions": _actions},
         )

@@ -27,7 +27,7 @@ Observations are float64 and clipped to their bounds (`observation_bounds`):
 The reward of a step is max(0, 1 - |v - c| / c) max(0, u), with the velocity v along the world's x after the step, the
 command c and the upward component u of the body's vertical axis; it is 0 if the insect falls. A fall terminates an
 episode: the trunk touches the ground. The end of the duration truncates it, and so does a foot that reaches the end of
-a step, gap or hurdle. The module `observing` computes observations, rewards and falls.
+a step, gap or hurdle.
 """
 
 from dataclasses import dataclass, field
@@ -131,16 +131,12 @@ def observation_bounds(compiled: CompiledBody, task: Task) -> dict[str, tuple[np
     return {name: (np.full(shape, low), np.full(shape, high)) for name, (shape, low, high) in bounds.items()}
 
 
-def action_names(compiled: CompiledBody, task: Task) -> tuple[str, ...]:
-    """Return the names of an action's numbers, such as the joints' names or 'L1_forward', (number,)."""
-    if task.actions == "joints":
-        return compiled.body.joints
-    return tuple(f"{leg}_{axis}" for leg in LEGS for axis in ("forward", "left", "up"))
-
-
 def action_bounds(compiled: CompiledBody, task: Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the smallest, the default and the largest action, (number,) each: joint targets [rad], by default the home
-    posture, or tip offsets [mm], by default 0."""
+    """Return the smallest, the default and the largest action, (number,) each.
+
+    They are joint targets, (leg * joint,) [rad], by default the home posture, or tip offsets forward, left and up,
+    (leg * axis,) [mm], by default 0.
+    """
     if task.actions == "joints":
         low, high = compiled.model.actuator_ctrlrange[compiled.columns.ctrl].T
         return low, compiled.home[compiled.columns.qpos], high
@@ -157,10 +153,8 @@ def checked_actions(
         InputError: the shape of the actions is wrong, or a number is out of its bounds.
     """
     actions = np.asarray(actions, dtype=float)
-    if actions.shape != shape:
-        raise InputError(f"the action has the shape {actions.shape}; expected {shape}")
-    if not _within(actions, low, high):
-        raise InputError(f"action = {short(actions)}; expected values within the action space")
+    if actions.shape != shape or not _within(actions, low, high):
+        raise InputError(f"action = {short(actions)}; expected the shape {shape} and values within the action space")
     return actions
 
 

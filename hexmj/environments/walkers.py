@@ -7,18 +7,16 @@ depends neither on the number of insects nor on its group.
 
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Union
 
 import mujoco
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.ground import beyond_the_ground, blocks
-from hexmj.bodies.kinematics import standing_tips
 from hexmj.controllers.planning import advanced
 from hexmj.controllers.planning import begin as begin_plan
 from hexmj.controllers.protocol import FeedbackPlan, Plan
-from hexmj.environments.observing import Observer, Places, Planned, end_step, next_targets, scaled
+from hexmj.environments.observing import Observer, end_step, next_targets
 from hexmj.environments.task import Task, action_bounds
 from hexmj.errors import InputError
 from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, walk_error
@@ -30,22 +28,13 @@ from hexmj.physics.substeps import FineSteps, Shown, allowed_depth, strikes
 STEPS_AHEAD = 128
 """Number of steps that a plan without sensory feedback plans at once."""
 
-Bodies = Union["Alone", MujocoBatch]
-"""Engine that steps the insects: `Alone` for one insect, `MujocoBatch` for many."""
-
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """MuJoCo's state elements that `Alone` stores before a step: all that determine the step, and the time."""
 
 
-class Acted(NamedTuple):
-    """Result of a step for every insect."""
-
-    reward: np.ndarray
-    """(insect,) reward of the step; 0 for insects whose episode was already over."""
-    terminated: np.ndarray
-    """(insect,) whether the insect fell in this step."""
-    truncated: np.ndarray
-    """(insect,) whether this step reached the time limit or the end of the ground without a fall."""
+Acted = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Result of a step for every insect, (insect,) each: the reward, 0 for insects whose episode was already over; whether
+the insect fell; and whether the step reached the time limit or the end of the ground without a fall."""
 
 
 @dataclass(eq=False)
@@ -67,33 +56,52 @@ class Group:
 class Walkers:
     """Insects that take actions, each in its own episode."""
 
-    def __init__(self, task: Task, compiled: CompiledBody, bodies: Bodies, count: int, threads: int | None) -> None:
-        """Prepare `count` insects, which `threads` threads settle at their starts, by default one per core."""
-        self._task, self._compiled, self._threads = task, compiled, threads
+    def __init__(
+        self,
+        task: Task,
+        compiled: CompiledBody,
+        bodies: "Alone | MujocoBatch",
+        count: int = 1,
+        threads: int | None = 1,
+        normalised: bool = True,
+    ) -> None:
+        """Prepare insects.
+
+        Args:
+            task: the task of all insects.
+            compiled: their compiled body.
+            bodies: engine that steps them.
+            count: number of insects.
+            threads: number of threads that settle insects at their starts; None is one per core.
+            normalised: whether actions lie in -1 ... 1, see `act`.
+        """
+        self._task, self._compiled, self.bodies, self._threads = task, compiled, bodies, threads
         self._settling = Settling(task.conditions, task.stride, threads)
-        self._steps, self._substeps, self._command = task.steps, task.substeps, task.command
-        self._count, self._ids = count, np.arange(0)
-        self._walking, self._done = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
+        self._substeps, self._last, self._command = task.substeps, task.steps, task.command
+        self._take = bodies.take if isinstance(bodies, Alone) else FineSteps.of(bodies, task.substeps, compiled).take
         self.begun = False
-        """Whether a step is allowed: all insects have begun, and no step or reset has failed since."""
-        self._groups: list[Group] = []
+        """Whether all insects have begun, and no step or reset has failed since."""
+        self.walking = np.zeros(count, dtype=bool)
+        """(insect,) whether the episode of the insect is not over."""
+        self._ids, self._done, self._groups = np.arange(0), np.zeros(count, dtype=int), list[Group]()
         tips, stance = np.empty((count, STEPS_AHEAD, task.substeps, 6, 3)), np.empty((count, STEPS_AHEAD, 6), bool)
         self._ahead = tips, stance, np.zeros(count, dtype=int)  # tips, stance, index of the next step
-        self._joints = np.empty((count, 6, compiled.joints // 6))
-        self._planned = Planned(np.ones((count, 6)), np.empty((count, 6, 3)), np.zeros((count, 6)))
-        low, self._default, high = action_bounds(compiled, task)
-        self._below, self._above = self._default - low, high - self._default
-        self.observer = Observer(compiled, task)
+        self._joints = np.empty((count, 6, compiled.joints // 6))  # last targets
+        self.state = bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors
+        """Positions, velocities, rotations from the root frames to the world, (insect, axis, axis), and sensors of all
+        insects; only sensors of MuJoCo's position stage are current."""
+        self.planned = np.ones((count, 6)), np.empty((count, 6, 3)), np.zeros((count, 6))
+        """Planned stance, 1 or 0, (insect, leg), planned tips without offsets in the root frame, (insect, leg, axis)
+        [mm], and number of substeps of the last step in which the tip was out of reach, (insect, leg)."""
+        self._observer = Observer(compiled, task)
         self._trunk = compiled.columns.trunk.start, compiled.columns.trunk.stop
-        self.bind(bodies)
+        low, default, high = action_bounds(compiled, task)
+        self._scale = (default, default - low, high - default) if normalised else (0 * low, *np.ones((2, len(low))))
 
-    def bind(self, bodies: Bodies) -> None:
-        """Step these bodies from now on, and refer to the arrays that hold their current states."""
-        self.bodies, self.places = bodies, Places(bodies.qpos, bodies.qvel, bodies.rotation, bodies.sensors)
-        self._passed = tuple(self.places), tuple(self._planned)  # numba unpacks plain tuples faster
-        self._take = (
-            bodies.take if isinstance(bodies, Alone) else FineSteps.of(bodies, self._substeps, self._compiled).take
-        )
+    @property
+    def over(self) -> bool:
+        """Whether a reset is needed: no insect has begun, all episodes are over, or a step or a reset failed."""
+        return not self.begun or len(self._ids) == 0
 
     def begin(self, ids: np.ndarray, starts: np.ndarray) -> None:
         """Begin episodes of the insects `ids`, (n,), at starts, (n, leg) [mm]. The first call must begin all insects.
@@ -109,120 +117,101 @@ class Walkers:
         targets = TipTargets(settled.starts, task.conditions, task.stride)
         self._groups.append(Group(ids, np.arange(len(ids)), plan, targets))
         self.bodies.stand(ids, settled.state, settled.ctrl)
-        if len(ids) == self._count:
+        if len(ids) == len(self.walking):
             self._senses = Senses(settled)
         else:
             self._senses.restart(ids, settled)
         self._joints[ids] = settled.ctrl[:, self._compiled.columns.ctrl].reshape(len(ids), 6, -1)
-        standing = standing_tips(settled.starts, task.conditions.standing_height, task.stride)
-        for shown, now in zip(self._planned, (1.0, standing, 0.0), strict=True):
-            shown[ids] = now
-        self._done[ids], self._walking[ids] = 0, True
-        self._ids, self.begun = np.flatnonzero(self._walking), True
+        for planned, now in zip(self.planned, (1.0, settled.tips, 0.0), strict=True):
+            planned[ids] = now
+        self._done[ids], self.walking[ids] = 0, True
+        self._ids, self.begun = np.flatnonzero(self.walking), True
 
     def act(self, actions: np.ndarray) -> Acted:
         """Take one step of all insects whose episodes are not over.
 
         Args:
-            actions: normalised actions, (insect, number): 0 is the default, -1 the smallest and 1 the largest action.
+            actions: actions of all insects, (insect, number): joint targets [rad] or tip offsets [mm]; if normalised, 0
+                is the default, -1 the smallest and 1 the largest action.
 
         Raises:
             InputError: no episode has begun, a step or reset has failed, or a plan is invalid.
             SimulationError: the simulation of an insect diverged.
         """
-        self.check_begun()
-        if self.over:
-            return self._nothing()
-        control = self.control(scaled(actions, self._ids, self._default, self._below, self._above))
+        if not self.begun:
+            raise InputError("no episode is running, or a step or a reset failed; reset all insects first")
+        count, ids = len(self.walking), self._ids
+        acted = np.zeros(count), np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+        if len(ids) == 0:
+            return acted
+        self.begun = False  # remains False if the step fails, because only some insects may have taken it
         try:
-            return self.judge(self._take(self._ids, control))
+            shown = self._take(ids, self._control(ids, actions))
         except Diverged as error:
             time = float(self._done[error.start] * self._task.stride.dt)
             raise walk_error(error, "acting", time) from None
-
-    def check_begun(self) -> None:
-        """Raise InputError unless all insects have begun and no step or reset has failed since."""
-        if not self.begun:
-            raise InputError("no episode is running, or a step or a reset failed; reset all insects first")
-
-    @property
-    def over(self) -> bool:
-        """Whether all insects have begun and all their episodes are over."""
-        return self.begun and len(self._ids) == 0
-
-    def control(self, actions: np.ndarray) -> np.ndarray:
-        """Return the controls of one step, (n, substep, actuator), for the n insects that walk; then call `judge`.
-
-        Args:
-            actions: joint targets [rad] or tip offsets [mm] of the insects that walk, (n, number).
-        """
-        self.begun = False  # remains False if the step fails, because only some insects may have taken it
-        for group in self._groups:
-            self._plan(group)
-        ids, substeps, offset = self._ids, self._substeps, self._task.actions == "tips"
-        tips = next_targets(actions, ids, self._ahead, self._passed[1], offset)
-        if offset:
-            joints, reachable = self._compiled.inverse(tips)
-            if np.count_nonzero(reachable) < reachable.size:
-                self._planned.missed[ids] = substeps - reachable.sum(axis=1)
-                hold(joints.swapaxes(0, 1), self._joints[ids])
-            self._joints[ids] = joints[:, -1]
-            control = joints.reshape(len(ids), substeps, -1)
-        else:
-            control = actions[:, np.newaxis].repeat(substeps, axis=1)
-        if self._task.conditions.grasp:
-            stance = self._planned.stance[ids, np.newaxis]
-            control = np.concatenate([control, stance.repeat(substeps, axis=1)], axis=2)
-        return control
-
-    def judge(self, shown: Shown) -> Acted:
-        """Return the result of a step from its record, (n, substep, ...), and end the episodes that are over."""
-        ids, acted = self._ids, self._nothing()
         self._senses.feel(ids, shown["sensors"], shown["force"])
-        time, result = (self._done, self._steps), tuple(acted)
-        ended = end_step(self._passed[0], ids, shown["sensors"], self._trunk, self._command, time, result)
-        if blocks(self._task.conditions):
-            feet = self.places.sensors[ids, self._compiled.columns.foot].reshape(-1, 6, 3)
-            beyond = beyond_the_ground(self._task.conditions, feet).any(axis=1)
-            acted.truncated[ids] |= beyond & ~acted.terminated[ids]
-            ended |= bool(beyond.any())
-        if ended:
-            self._leave(np.flatnonzero(acted.terminated | acted.truncated))
+        self._judge(ids, shown, acted)
         self.begun = True
         return acted
 
-    def observations(self) -> np.ndarray:
-        """Return the observations of all insects, (insect, number); `observer.named` splits them by name."""
-        places, planned = self._passed
-        return self.observer.observe(places, self._senses.standing(), planned)
+    def observations(self, insects: int | slice = np.s_[:]) -> dict[str, np.ndarray]:
+        """Return the observations of all insects, or of some of them, by name."""
+        flat = self._observer.observe(self.state, self._senses.standing(), self.planned)
+        return self._observer.named(flat[insects])
+
+    def _control(self, ids: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """Return the controls of the next step, (n, substep, actuator), for the n insects that walk."""
+        for group in self._groups:
+            self._plan(group)
+        tips, substeps, (stance, _, missed) = self._task.actions == "tips", self._substeps, self.planned
+        control = next_targets(actions, ids, self._scale, self._ahead, self.planned, tips)
+        if tips:
+            joints, reachable = self._compiled.inverse(control.reshape(len(ids), substeps, 6, 3))
+            if np.count_nonzero(reachable) < reachable.size:
+                missed[ids] = substeps - reachable.sum(axis=1)
+                hold(joints.swapaxes(0, 1), self._joints[ids])
+            self._joints[ids] = joints[:, -1]
+            control = joints.reshape(len(ids), substeps, -1)
+        if self._task.conditions.grasp:
+            control = np.concatenate([control, stance[ids, np.newaxis].repeat(substeps, axis=1)], axis=2)
+        return control
+
+    def _judge(self, ids: np.ndarray, shown: Shown, acted: Acted) -> None:
+        """Write the result of a step to `acted`, from its record, (n, substep, ...), and end episodes that are over."""
+        (_, fell, over), conditions, time = acted, self._task.conditions, (self._done, self._last)
+        ended = end_step(ids, shown["sensors"], self.state, self._trunk, self._command, time, acted)
+        if blocks(conditions):
+            feet = self.bodies.sensors[ids, self._compiled.columns.foot].reshape(-1, 6, 3)
+            beyond = beyond_the_ground(conditions, feet).any(axis=1)
+            over[ids] |= beyond & ~fell[ids]
+            ended |= bool(beyond.any())
+        if ended:
+            self._leave(np.flatnonzero(fell | over))
 
     def _leave(self, ids: np.ndarray) -> None:
         """End the episodes of the insects `ids`, (n,)."""
-        self._walking[ids] = False
-        self._ids = np.flatnonzero(self._walking)
+        self.walking[ids] = False
+        self._ids = np.flatnonzero(self.walking)
         for group in self._groups:
-            still = self._walking[group.ids]
+            still = self.walking[group.ids]
             group.ids, group.rows = group.ids[still], group.rows[still]
         self._groups = [group for group in self._groups if len(group.ids)]
 
     def _plan(self, group: Group) -> None:
         """Count one planned step of a group as walked; before that, plan further steps if none is left."""
         if group.ahead == 0:
-            ids, steps = group.ids, min(STEPS_AHEAD, self._steps - group.plan.done)
+            ids, steps = group.ids, min(STEPS_AHEAD, self._last - group.plan.done)
             if isinstance(group.plan, FeedbackPlan):
-                sensed = self._senses.sensed(ids, self.places.qpos[ids], self.places.qvel[ids])
+                sensed = self._senses.sensed(ids, self.bodies.qpos[ids], self.bodies.qvel[ids])
                 group.plan.sense(replace(sensed, ids=group.rows.copy()))
                 steps = 1
             walk = advanced(group.plan, steps)
-            tips, stance, at = self._ahead
+            tips, stance, following = self._ahead
             tips[ids, :steps] = group.targets.follow(walk, group.rows).reshape(len(ids), steps, -1, 6, 3)
             stance[ids, :steps] = walk.stance[:, group.rows].swapaxes(0, 1)
-            at[ids], group.ahead = 0, steps
+            following[ids], group.ahead = 0, steps
         group.ahead -= 1
-
-    def _nothing(self) -> Acted:
-        """Return the result of a step in which no insect walks: zeros and False."""
-        return Acted(np.zeros(self._count), np.zeros(self._count, dtype=bool), np.zeros(self._count, dtype=bool))
 
 
 class Alone:
@@ -231,15 +220,15 @@ class Alone:
     Each step ends with MuJoCo's mj_step1, the first half of the next step, so that positions of feet are current.
     """
 
-    def __init__(self, compiled: CompiledBody, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Wrap a model and its data, which the caller may read and change between steps."""
-        self.model, self.data, self._foot = model, data, compiled.columns.foot
+    def __init__(self, compiled: CompiledBody, data: mujoco.MjData) -> None:
+        """Wrap data of the compiled model, which the caller may read and change between steps."""
+        self.model, self.data, self._foot = compiled.model, data, compiled.columns.foot
         self._compiled, self._allowed = compiled, allowed_depth(compiled)
         self.qpos, self.qvel = data.qpos[np.newaxis], data.qvel[np.newaxis]
         self.rotation = data.xmat[compiled.root].reshape(1, 3, 3)
         self.sensors = data.sensordata[np.newaxis]
         self._control, self._sensors, self._force = data.ctrl, data.sensordata, data.actuator_force
-        self._warned, self._size = data.warning.number, mujoco.mj_stateSize(model, _STATE)
+        self._warned, self._size = data.warning.number, mujoco.mj_stateSize(self.model, _STATE)
 
     def put(self, ids: np.ndarray, states: np.ndarray) -> None:
         """Set the state of the body, `states` (1, state), see `engine.Engine.put`."""
