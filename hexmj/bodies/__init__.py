@@ -1,1 +1,1 @@
-"""Bodies: MJCF, validation, kinematics, ground and the compiled model."""
+"""Bodies: MJCF, kinematics, ground and the compiled model."""

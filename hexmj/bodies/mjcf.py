@@ -16,6 +16,7 @@ Both gains are rounded to `Servo.digits`. For the stick insect, 398728 becomes 4
 """
 
 import copy
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 
@@ -24,15 +25,23 @@ import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody, add_sensors
 from hexmj.bodies.ground import lay_ground
-from hexmj.bodies.kinematics import joint_numbers, posed
-from hexmj.bodies.validation import check
-from hexmj.body import Body
+from hexmj.bodies.kinematics import hinge_chains, joint_numbers, posed
+from hexmj.body import Body, Leg
 from hexmj.conditions import Conditions
 from hexmj.errors import InputError
 from hexmj.legs import LEGS
 
 HOME_TOLERANCE = 1e-3
 """Tolerance of the positions of feet and centre of mass in posture home, in lengths of the shortest leg."""
+
+LEG_TOLERANCE = 1.5
+"""Maximum factor between `Lengths.shortest_leg` and the shortest leg of the MJCF."""
+
+LEAST_GRAVITY = 100.0
+"""Minimum gravity, a sixteenth of the moon's [mm/s^2]; a smaller value is taken for one in m/s^2."""
+
+MASS_TOLERANCE = 1e-3
+"""Maximum relative difference between the mass of the model and `Body.mass`."""
 
 
 def compile_body(
@@ -120,7 +129,7 @@ def _plain_model(body: Body, mjcf: bytes) -> mujoco.MjModel:
         model = mujoco.MjModel.from_xml_path(str(body.mjcf))
     except ValueError as error:
         raise InputError(f"body {body.name!r}: {body.mjcf} does not compile: {' '.join(str(error).split())}") from None
-    check(model, body)
+    _check(model, body)
     return model
 
 
@@ -151,7 +160,6 @@ def _compiled(conditions: Conditions, looks: bool, pushes: bool, mjcf: bytes) ->
     feet = [model.site(foot).id for foot in body.feet]
     model.site_type[feet], radius = mujoco.mjtGeom.mjGEOM_SPHERE, model.geom(body.feet[0]).size[0]
     model.site_size[feet, 0] = radius + radius / 10  # a touch sensor counts only contacts within its site
-    check(model, body, finished=True)
     if conditions.softness:
         model.pair_solref[:, 0] = conditions.softness / 1000.0
     if conditions.pitch or conditions.roll:
@@ -169,7 +177,7 @@ def _add_missing(spec: mujoco.MjSpec, plain: mujoco.MjModel, body: Body) -> None
         plain: model of the unchanged MJCF.
         body: description of the body.
     """
-    if spec.option.integrator == mujoco.mjtIntegrator.mjINT_EULER:
+    if spec.option.integrator in (mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_RK4):
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
@@ -219,3 +227,66 @@ def _centre_of_mass(model: mujoco.MjModel, body: Body) -> np.ndarray:
     data = posed(model, model.key(body.home).qpos)
     mujoco.mj_comPos(model, data)
     return data.subtree_com[model.body(body.root).id].copy()
+
+
+def _check(model: mujoco.MjModel, body: Body) -> None:
+    """Check the model of an unchanged MJCF.
+
+    Raises:
+        InputError: the MJCF does not fit the description of the body.
+    """
+    try:
+        model.key(body.home)
+        for fault in _faults(model, body):
+            raise InputError(f"body {body.name!r}: {fault}")
+    except KeyError as error:  # an unknown name
+        raise InputError(f"body {body.name!r}: {error.args[0]}") from None
+
+
+def _faults(model: mujoco.MjModel, body: Body) -> Iterator[str]:
+    kinds, joints = mujoco.mjtJoint, [model.joint(i).name for i in range(1, model.njnt)]
+    if model.njnt == 0 or model.jnt_type[0] != kinds.mjJNT_FREE or model.jnt_bodyid[0] != model.body(body.root).id:
+        yield f"root {body.root!r} needs a free joint, which must be the first joint of the MJCF"
+    if joints != list(body.joints):
+        yield f"joints after the root's: {', '.join(joints)}; expected, in this order: {', '.join(body.joints)}"
+    if not ((model.jnt_type == kinds.mjJNT_HINGE) & (model.jnt_limited == 1))[1:].all():
+        yield "every joint of a leg must be a hinge with a range"
+    driven = model.actuator_trnid[:, 0].tolist() == list(range(1, model.njnt))
+    if model.nu and not (driven and (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).all()):
+        yield f"{model.nu} actuators; expected one for each joint in the order of the joints, or none"
+    if model.neq or model.ntendon or model.jnt_actfrclimited.any():
+        yield "the MJCF must not have equality constraints, tendons or actuatorfrcrange (effort in a URDF)"
+    gravity = model.opt.gravity
+    if gravity[:2].any() or not -gravity[2] >= LEAST_GRAVITY:
+        yield f"gravity = {gravity.tolist()} mm/s^2; expected a vector that points down, as (0, 0, -9810)"
+    mass = model.body_subtreemass[model.body(body.root).id]
+    if not abs(mass - body.mass) <= MASS_TOLERANCE * body.mass:
+        yield f"mass = {body.mass:g} g; expected the mass of the MJCF, {mass:.6g} g"
+    for leg in body.legs:
+        yield from _leg(model, body, leg)
+    if len({float(model.geom(foot).size[0]) for foot in body.feet}) > 1:
+        yield "all feet must have the same radius"
+    factor = hinge_chains(model, body).length.min() / body.lengths.shortest_leg
+    if not 1 / LEG_TOLERANCE <= factor <= LEG_TOLERANCE:
+        yield f"the shortest leg of the MJCF is not as long as shortest_leg; use lengths.scaled({factor:.3g})"
+    ground = model.geom(body.ground)
+    level = not (ground.bodyid[0] or ground.pos[2] or ground.quat[1:3].any())
+    if ground.type[0] != mujoco.mjtGeom.mjGEOM_PLANE or not level:
+        yield f"geom {body.ground!r} must be a level plane at z = 0 in the worldbody"
+    allowed = {frozenset((ground.id, model.geom(part).id)) for part in (*body.trunk, *body.feet)}
+    if not {frozenset(pair) for pair in np.stack([model.pair_geom1, model.pair_geom2], axis=1).tolist()} <= allowed:
+        yield f"expected only contact pairs of {body.ground!r} with the feet and the parts of the trunk"
+
+
+def _leg(model: mujoco.MjModel, body: Body, leg: Leg) -> Iterator[str]:
+    foot, site, chain = model.geom(leg.foot), model.site(leg.foot), []
+    around = foot.bodyid[0] == site.bodyid[0] and (foot.pos == site.pos).all()
+    if foot.type[0] != mujoco.mjtGeom.mjGEOM_SPHERE or not around:
+        yield f"geom {leg.foot!r} must be a sphere around the site {leg.foot!r}"
+    part, root = model.body(foot.bodyid[0]), model.body(body.root).id
+    while part.id not in (0, root):
+        chain = [model.joint(part.jntadr[0] + i).name for i in range(part.jntnum[0])] + chain
+        part = model.body(part.parentid[0])
+    if part.id != root or tuple(chain) != leg.joints:
+        found = ", ".join(chain) or "none"
+        yield f"joints from {body.root!r} to foot {leg.foot!r}: {found}; expected {', '.join(leg.joints)}"
