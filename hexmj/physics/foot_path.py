@@ -21,16 +21,13 @@ from hexmj.errors import InputError
 from hexmj.jitted import jitted
 from hexmj.physics.settle import Settled
 from hexmj.timing import Stride, steps_within
-from hexmj.walks import PlannedWalk, part_of
+from hexmj.walks import PlannedWalk
 
 EVENLY = 0.25
 """Share of the step height that is linear in the phase of the lift; it determines the speed at touchdown."""
 
 CHUNK = 40
 """Approximate number of physics steps in a chunk. Short chunks cost calls, long chunks waste steps after a fall."""
-
-AHEAD = 8
-"""Number of chunks planned at once for a single start; planning each chunk by its own call costs 8 % of the time."""
 
 
 class TipTargets:
@@ -107,7 +104,7 @@ class OrdersFromPlan:
         check_made_for(plan, settled.conditions)
         self._plan, self._settled, self._substeps = plan, settled, settled.substeps
         self.steps, self._done = int(steps_within(duration, settled.stride)), 0
-        self._chunk, self._planned = steps_in_chunk(self._substeps, divisor), list[PlannedWalk]()
+        self._chunk = steps_in_chunk(self._substeps, divisor)
         self._follow = TipTargets(settled.starts, settled.conditions, settled.stride, settled.tips[..., 1]).follow
         self._joints = settled.ctrl[:, settled.compiled.columns.ctrl].reshape(len(settled.ctrl), 6, -1).copy()
         self.tips = settled.tips.copy()
@@ -124,7 +121,7 @@ class OrdersFromPlan:
         first, m = self._done * self._substeps, self._substeps
         if self._done == self.steps:
             return None
-        plan = self._next_chunk() if steps is None else advanced(self._plan, steps)
+        plan = advanced(self._plan, steps or self.steps_ahead())
         self._done += len(plan.time)
         tips = self._follow(plan, ids)
         joints, reachable = self._settled.compiled.inverse(tips)
@@ -139,15 +136,6 @@ class OrdersFromPlan:
         if self._done == self.steps:  # one more substep records the state at the end
             control = np.concatenate([control, control[:, -1:]], axis=1)
         return Orders(plan, first, ids, control, tips[:, : control.shape[1]], ~reachable)
-
-    def _next_chunk(self) -> PlannedWalk:
-        if len(self._settled.starts) > 1:
-            return advanced(self._plan, self.steps_ahead())
-        if not self._planned:
-            steps, size = min(AHEAD * self._chunk, self.steps - self._done), self._chunk
-            planned = advanced(self._plan, steps)
-            self._planned = [part_of(planned, slice(begin, begin + size)) for begin in range(0, steps, size)][::-1]
-        return self._planned.pop()
 
 
 def steps_in_chunk(substeps: int, divisor: int = 0) -> int:
