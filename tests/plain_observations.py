@@ -3,7 +3,7 @@
 import numpy as np
 
 from hexmj.bodies.compiled import CompiledBody
-from hexmj.environments.task import Task, observation_bounds
+from hexmj.environments.task import Task, observation_shapes
 from hexmj.stability import stability_margin
 
 State = tuple[np.ndarray, ...]
@@ -37,8 +37,7 @@ def plain_observations(
         "planned_tips": tips,
         "out_of_reach": missed,
     }
-    bounds = observation_bounds(compiled, task)
-    return {name: np.clip(observed[name], low, high) for name, (low, high) in bounds.items()}
+    return {name: observed[name] for name in observation_shapes(compiled, task)}
 
 
 def plain_rewards(state: State, fell: np.ndarray, task: Task) -> np.ndarray:

@@ -21,7 +21,7 @@ except ModuleNotFoundError:
     raise InputError("dm_control, which needs Python below 3.13, is not installed: use environments.gym") from None
 
 from hexmj.bodies.mjcf import compile_body
-from hexmj.environments.task import Task, action_bounds, checked_actions, draw_start, observation_bounds
+from hexmj.environments.task import Task, action_bounds, draw_start, observation_shapes
 from hexmj.environments.walkers import Alone, Walkers
 from hexmj.validate import whole
 
@@ -37,7 +37,7 @@ def load(velocity: float = 0.3, *, seed: int = 0, **task: Any) -> "Insect":
             offsets to the planned tips forward, left and up, (leg * axis,) [mm].
 
     Raises:
-        InputError: an argument is out of its range. The environment's `step` raises it if an action is out of bounds.
+        InputError: an argument is out of its range.
     """
     return Insect(Task(velocity, **task), whole("seed", seed, 0))
 
@@ -68,14 +68,13 @@ class Insect(control.Environment):
         """Take one step of the plan, which is several substeps of the physics; after an episode, begin the next.
 
         Raises:
-            InputError: the action is out of bounds.
+            InputError: the action is NaN.
             SimulationError: the simulation diverged.
         """
         if self._walkers.over:
             return self.reset()
-        low, _, high = action_bounds(self.compiled, self.settings)
-        acted = self._walkers.act(checked_actions(action, low.shape, low, high)[np.newaxis])
-        (reward, fell, over), seen = (values.item() for values in acted), self._walkers.observations(0)
+        reward, fell, over = (values.item() for values in self._walkers.act(action))
+        seen = self._walkers.observations(0)
         if fell:
             return dm_env.termination(reward, seen)
         return dm_env.truncation(reward, seen) if over else dm_env.transition(reward, seen)
@@ -85,7 +84,7 @@ class Insect(control.Environment):
         low, _, high = action_bounds(self.compiled, self.settings)
         return specs.BoundedArray(low.shape, float, low, high, self.settings.actions)
 
-    def observation_spec(self) -> dict[str, specs.BoundedArray]:
-        """Return the bounds and shape of every observation, by name."""
-        bounds = observation_bounds(self.compiled, self.settings)
-        return {name: specs.BoundedArray(low.shape, float, low, high, name) for name, (low, high) in bounds.items()}
+    def observation_spec(self) -> dict[str, specs.Array]:
+        """Return the shape of every observation, by name."""
+        shapes = observation_shapes(self.compiled, self.settings)
+        return {name: specs.Array(shape, float, name) for name, shape in shapes.items()}

@@ -28,7 +28,7 @@ except ModuleNotFoundError:
 
 from hexmj.bodies.compiled import CompiledBody
 from hexmj.bodies.mjcf import compile_body
-from hexmj.environments.task import Task, action_bounds, checked_actions, draw_start, observation_bounds
+from hexmj.environments.task import Task, action_bounds, draw_start, observation_shapes
 from hexmj.environments.walkers import Alone, Walkers
 from hexmj.physics.engine import MujocoBatch
 from hexmj.rendering import gl
@@ -45,7 +45,7 @@ class Insects:
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 800}  # noqa: RUF012  # Gymnasium reads the class attribute
 
-    def prepare(self, render_mode: str | None, task: dict[str, Any]) -> tuple[spaces.Dict, spaces.Box]:
+    def prepare(self, render_mode: str | None, task: dict[str, Any]) -> tuple[Any, spaces.Box]:
         """Compile the body of a `task.Task`, and return the spaces of one insect's observations and actions.
 
         Raises:
@@ -57,8 +57,8 @@ class Insects:
         fps = max(1, round(1.0 / conditions.seconds(stride)))  # real time, with one frame after each step
         self.metadata = Insects.metadata | {"render_fps": fps}
         self._frames = Frames(self._compiled) if render_mode else None
-        bounds = observation_bounds(self._compiled, self.task).items()
-        observed: dict[str, Any] = {name: spaces.Box(low, high, dtype=np.float64) for name, (low, high) in bounds}
+        shapes = observation_shapes(self._compiled, self.task).items()
+        observed: Any = {name: spaces.Box(-np.inf, np.inf, shape, np.float64) for name, shape in shapes}
         numbers = len(action_bounds(self._compiled, self.task)[0])
         return spaces.Dict(observed), spaces.Box(-1.0, 1.0, (numbers,), np.float32)
 
@@ -110,13 +110,12 @@ class StickInsect(Insects, gymnasium.Env[Observations, np.ndarray]):
         """Take one step of the plan, which is several substeps of the physics.
 
         Raises:
-            InputError: the action is out of bounds, or no episode is running.
+            InputError: the action is NaN, or no episode is running.
             SimulationError: the simulation diverged.
         """
         if self._walkers.over:
             raise InputError("no episode is running; call reset() first")
-        acted = self._walkers.act(checked_actions(action, self.action_space.shape)[np.newaxis])
-        reward, fell, over = (values.item() for values in acted)
+        reward, fell, over = (values.item() for values in self._walkers.act(action))
         return self._walkers.observations(0), reward, fell, over, {}
 
     def render(self) -> np.ndarray | None:
@@ -191,10 +190,10 @@ class StickInsects(Insects, VectorEnv[Observations, np.ndarray, np.ndarray]):
         the mode 'Disabled', an insect whose episode has ended keeps its state, with reward 0, until it is reset.
 
         Raises:
-            InputError: an action is out of bounds.
+            InputError: an action is NaN.
             SimulationError: a simulation diverged, or a start did not settle; all insects must be reset then.
         """
-        reward, fell, over = self._walkers.act(checked_actions(actions, self.action_space.shape))
+        reward, fell, over = self._walkers.act(actions)
         ended, before, infos = fell | over, self._ended, {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
             infos = self._final(ended)

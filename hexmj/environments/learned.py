@@ -6,8 +6,9 @@ controller does, for example in the league. A kinematic walk senses nothing: the
 upright insect that walks at the commanded velocity and stands on all feet that the plan puts in stance.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -29,23 +30,17 @@ CONTACT, STANCE, TIPS = slice(8, 14), slice(14, 20), slice(20, 38)
 FELT = 38
 """Number of the sensed numbers of one insect."""
 
-OBSERVED = "orientation", "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
-"""Names of the observations from which `felt_in` computes the sensed numbers."""
-
 MOST = 10.0
 """Largest magnitude of a sensed number, in units of its scale, see `felt`."""
 
 
-class Policy(Protocol):
-    """Protocol of a policy, a frozen dataclass of plain data: sensed numbers, (n, `FELT`) -> (n, leg * axis)."""
+Policy = Callable[[np.ndarray], np.ndarray]
+"""A policy, a frozen dataclass of plain data: sensed numbers, (n, `FELT`) -> offsets of the tips, (n, leg * axis).
 
-    def __call__(self, felt: np.ndarray) -> np.ndarray:
-        """Return offsets of each tip forward, left and up, in units of `Lengths.largest_tip_offset`.
-
-        Offsets are clipped to -1 ... 1. `WithOffsets` also keeps the tips between PEP_min and AEP_0, unless the plan
-        itself exceeds this range, because controllers must stay in it. An environment does not limit the tips so.
-        """
-        ...
+The offsets forward, left and up are in units of `Lengths.largest_tip_offset`, clipped to -1 ... 1. `WithOffsets` keeps
+the tips between PEP_min and AEP_0, unless the plan itself exceeds this range, because controllers must stay in it. An
+environment does not limit the tips so.
+"""
 
 
 def felt(body: Body, *parts: np.ndarray) -> np.ndarray:
@@ -65,7 +60,8 @@ def felt(body: Body, *parts: np.ndarray) -> np.ndarray:
 
 def felt_in(observations: dict[str, np.ndarray], body: Body = STICK_INSECT) -> np.ndarray:
     """Return sensed numbers from observations: of a vector environment (n, `FELT`), of a single one (`FELT`,)."""
-    orientation, *others = (np.asarray(observations[name]) for name in OBSERVED)
+    names = "velocity", "angular_velocity", "contact", "planned_stance", "planned_tips"
+    orientation, *others = (np.asarray(observations[name]) for name in ("orientation", *names))
     tilt = np.arcsin(np.clip(lean(orientation.reshape(-1, 4))[0], -1.0, 1.0))
     sensed = felt(body, tilt, *others)
     return sensed if orientation.ndim > 1 else sensed[0]

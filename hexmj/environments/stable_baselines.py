@@ -29,13 +29,11 @@ class FeltInsects(VecEnv):
         self.insects = StickInsects(num_envs, actions="tips", autoreset_mode="SameStep", **task)
         felt = spaces.Box(-MOST, MOST, (FELT,), np.float32)
         super().__init__(num_envs, felt, self.insects.single_action_space)  # pyright: ignore[reportArgumentType]
-        self._actions: Any = None
 
     def reset(self) -> np.ndarray:
         """Begin an episode of every insect, with the seeds set by the method `seed`, if any."""
         observed = self.insects.reset(seed=self._seeds)[0]
         self._reset_seeds()
-        self._reset_options()
         return self._seen(observed)
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -46,7 +44,7 @@ class FeltInsects(VecEnv):
         """Take one step of all insects with the stored actions.
 
         Raises:
-            InputError: an action is out of bounds.
+            InputError: an action is NaN.
             SimulationError: the simulation of an insect diverged.
         """
         observed, reward, fell, over, last = self.insects.step(self._actions)

@@ -5,6 +5,7 @@ plans many steps at once. A plan with sensory feedback receives the sensed legs 
 depends neither on the number of insects nor on its group.
 """
 
+import math
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -16,14 +17,14 @@ from hexmj.bodies.ground import beyond_the_ground, blocks
 from hexmj.controllers.planning import advanced
 from hexmj.controllers.planning import begin as begin_plan
 from hexmj.controllers.protocol import FeedbackPlan, Plan
-from hexmj.environments.observing import Observer, end_step, next_targets
-from hexmj.environments.task import Task, action_bounds
+from hexmj.environments.task import Task, action_bounds, end_step, next_targets, observation_shapes, write_observations
 from hexmj.errors import InputError
 from hexmj.physics.engine import STATE, STATE_BITS, Diverged, MujocoBatch, Rolled, walk_error
 from hexmj.physics.foot_path import TipTargets, check_made_for, hold
 from hexmj.physics.rollout import Senses
 from hexmj.physics.settle import Settling
 from hexmj.physics.substeps import FineSteps, Shown, allowed_depth, strikes
+from hexmj.timing import steps_within
 
 STEPS_AHEAD = 128
 """Number of steps that a plan without sensory feedback plans at once."""
@@ -77,7 +78,8 @@ class Walkers:
         """
         self._task, self._compiled, self.bodies, self._threads = task, compiled, bodies, threads
         self._settling = Settling(task.conditions, task.stride, threads)
-        self._substeps, self._last, self._command = task.substeps, task.steps, task.command
+        self._substeps, self._command = task.substeps, task.command
+        self._last = int(steps_within(task.duration, task.stride))
         self._take = bodies.take if isinstance(bodies, Alone) else FineSteps.of(bodies, task.substeps, compiled).take
         self.begun = False
         """Whether all insects have begun, and no step or reset has failed since."""
@@ -93,10 +95,15 @@ class Walkers:
         self.planned = np.ones((count, 6)), np.empty((count, 6, 3)), np.zeros((count, 6))
         """Planned stance, 1 or 0, (insect, leg), planned tips without offsets in the root frame, (insect, leg, axis)
         [mm], and number of substeps of the last step in which the tip was out of reach, (insect, leg)."""
-        self._observer = Observer(compiled, task)
-        self._trunk = compiled.columns.trunk.start, compiled.columns.trunk.stop
+        columns, no_foot, end = compiled.columns, compiled.body.lengths.no_foot_margin, 0
+        self._layout = compiled.joints, columns.foot.start, columns.centre_of_mass.start, task.command, no_foot
+        self._observed = dict[str, tuple[slice, tuple[int, ...]]]()  # columns and shape of each observation
+        for name, shape in observation_shapes(compiled, task).items():
+            self._observed[name] = slice(end, end := end + math.prod(shape)), shape
+        self._numbers, self._trunk = end, (columns.trunk.start, columns.trunk.stop)
         low, default, high = action_bounds(compiled, task)
-        self._scale = (default, default - low, high - default) if normalised else (0 * low, *np.ones((2, len(low))))
+        scale = (default, default - low, high - default) if normalised else (0 * low, *np.ones((2, len(low))))
+        self._scale = *scale, np.array(low), np.array(high)
 
     @property
     def over(self) -> bool:
@@ -135,12 +142,15 @@ class Walkers:
                 is the default, -1 the smallest and 1 the largest action.
 
         Raises:
-            InputError: no episode has begun, a step or reset has failed, or a plan is invalid.
+            InputError: no episode has begun, a step or reset has failed, an action is NaN, or a plan is invalid.
             SimulationError: the simulation of an insect diverged.
         """
         if not self.begun:
             raise InputError("no episode is running, or a step or a reset failed; reset all insects first")
         count, ids = len(self.walking), self._ids
+        actions = np.asarray(actions, dtype=float).reshape(count, len(self._scale[0]))
+        if np.isnan(actions).any():
+            raise InputError("an action is NaN")
         acted = np.zeros(count), np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
         if len(ids) == 0:
             return acted
@@ -157,8 +167,13 @@ class Walkers:
 
     def observations(self, insects: int | slice = np.s_[:]) -> dict[str, np.ndarray]:
         """Return the observations of all insects, or of some of them, by name."""
-        flat = self._observer.observe(self.state, self._senses.standing(), self.planned)
-        return self._observer.named(flat[insects])
+        flat, corners = np.empty((len(self.walking), self._numbers)), self._compiled.trunk_corners
+        write_observations(self.state, self._senses.standing(), self.planned, corners, self._layout, flat)
+        flat = flat[insects]
+        return {
+            name: flat[..., at].reshape(*flat.shape[:-1], *shape) if len(shape) > 1 else flat[..., at]
+            for name, (at, shape) in self._observed.items()
+        }
 
     def _control(self, ids: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """Return the controls of the next step, (n, substep, actuator), for the n insects that walk."""
@@ -183,9 +198,8 @@ class Walkers:
         ended = end_step(ids, shown["sensors"], self.state, self._trunk, self._command, time, acted)
         if blocks(conditions):
             feet = self.bodies.sensors[ids, self._compiled.columns.foot].reshape(-1, 6, 3)
-            beyond = beyond_the_ground(conditions, feet).any(axis=1)
-            over[ids] |= beyond & ~fell[ids]
-            ended |= bool(beyond.any())
+            over[ids] |= beyond_the_ground(conditions, feet).any(axis=1) & ~fell[ids]
+            ended |= bool(over.any())
         if ended:
             self._leave(np.flatnonzero(fell | over))
 
@@ -267,14 +281,9 @@ class Alone:
             sensors[0, k], force[0, k] = now, pull  # positions are those before the substep
         mujoco.mj_step1(self.model, data)
         if np.count_nonzero(self._warned):
-            raise self._diverged(before[0])
+            kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
+            mujoco.mj_setState(self.model, data, before[0], _STATE)
+            raise Diverged(0, ", ".join(kinds), {name: getattr(data, name).copy() for name in STATE})
         sensors[0, count] = now
         feet = sensors[:, :, self._foot].reshape(1, count + 1, 6, 3)
         return Rolled(before, feet, sensors[:, :count], force, torque=nothing, after=nothing)
-
-    def _diverged(self, state: np.ndarray) -> Diverged:
-        """Return the error of a diverged simulation, with the state before these substeps, (state,)."""
-        kinds = [mujoco.mjtWarning(kind).name for kind in np.flatnonzero(self._warned)]
-        before = mujoco.MjData(self.model)
-        mujoco.mj_setState(self.model, before, state, _STATE)
-        return Diverged(0, ", ".join(kinds), {name: getattr(before, name).copy() for name in STATE})

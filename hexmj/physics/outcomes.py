@@ -38,7 +38,7 @@ class Outcomes:
     carried_loss: np.ndarray
     """(start,) first loss of static stability: feet that carry load, the body's own centre of mass [time units]."""
     fall: np.ndarray
-    """(start,) first contact of the trunk with the ground [time units]; environments use `observing.judge`."""
+    """(start,) first contact of the trunk with the ground [time units]."""
     fall_part: np.ndarray
     """(start,) index in `Body.trunk` of the part that touches the ground first; -1 without a fall."""
     clearance: np.ndarray
