@@ -68,7 +68,7 @@ def held(insects: Any) -> Any:
         seen = np.ones((insects.num_envs, 1), np.float32)
 
         def reset(self) -> np.ndarray:
-            self.felt = self.venv.reset()
+            self.felt: Any = self.venv.reset()
             return self.seen
 
         def step_async(self, actions: np.ndarray) -> None:

@@ -174,7 +174,7 @@ def test_the_margin_without_contact_is_below_every_margin_with_one_foot():
     """At any reach of the legs."""
     walking = dm.load()
     walking.reset()
-    walkers = walking._walkers
+    walkers: Any = walking._walkers
 
     def margin(standing: np.ndarray) -> float:
         walkers._senses.standing = lambda: standing[np.newaxis]

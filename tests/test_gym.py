@@ -294,8 +294,9 @@ def test_bad_actions_are_refused_or_clipped(kind):
 
 @pytest.mark.parametrize("name", ["actions", "render_mode"])
 def test_bad_settings_are_refused(name):
+    wrong: Any = {name: "nothing"}
     with pytest.raises(InputError, match=name):
-        StickInsects(**{name: "nothing"})
+        StickInsects(**wrong)
 
 
 def test_a_seed_is_a_number_or_one_number_for_each_insect():
