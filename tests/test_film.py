@@ -153,7 +153,7 @@ def test_the_overlay_says_what_is_known(fallen, plan):
     assert "stable (grounded loss at" in Overlay(again, Film(), 0.0, 1.0)._state(unstable, take.lost)[0]
     assert [margin_in_words(margin) for margin in (-1.25, -np.inf)] == ["margin -1.2 mm", "no foot stands"]
     frame = np.full((480, 640, 3), 200, dtype=np.uint8)
-    overlay.draw(frame, 0, 0.15)
+    overlay.draw(frame, 0, 0.15, 5.0)
     assert (frame[80:370] == 200).all() and (frame[400:463, 326:340] < 30).all(axis=(0, 2)).any(), "a line at the time"
     part = Take.of(plan.isel(step=slice(10, 40)))  # beside a longer recording
     overlay = Overlay(part, Film(), 0.0, 1.0)

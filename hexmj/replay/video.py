@@ -90,7 +90,7 @@ class Film:
 
 
 class Overlay:
-    """Draws caption, legend and footfall diagram of one take on frames of one size."""
+    """Draws caption, scale bar, legend and footfall diagram of one take on frames of one size."""
 
     def __init__(self, take: Take, film: Film, begin: float, end: float) -> None:
         """Draw the legend and the complete diagram in advance, with a time axis from `begin` to `end` [s]."""
@@ -105,13 +105,14 @@ class Overlay:
         self._legend = self._marks()
         self._blank, self._full = (self._diagram(width, height - self._bottom, bars) for bars in (False, True))
 
-    def draw(self, frame: np.ndarray, row: int, seconds: float) -> None:
+    def draw(self, frame: np.ndarray, row: int, seconds: float, scale: float) -> None:
         """Draw on a frame that shows the walk.
 
         Args:
             frame: (height, width, 3), changed in place.
             row: index of the step at whose end the frame shows the body.
             seconds: time of the frame on the time axis of the diagram [s].
+            scale: pixels per mm at the centre of mass.
         """
         now, cursor = self._column(seconds), self._pixels(1)
         diagram = frame[self._bottom :]
@@ -122,7 +123,17 @@ class Overlay:
         strip = frame[self._bottom - self._pixels(STRIP) : self._bottom]
         image = _faded(strip, 0.6)
         image.paste(self._legend, (image.width - self._legend.width, 0), self._legend)
+        self._draw_scale(ImageDraw.Draw(image), image.height // 2, scale)
         strip[:] = np.asarray(image)
+
+    def _draw_scale(self, draw: ImageDraw.ImageDraw, middle: int, scale: float) -> None:
+        """Draw a bar of a round length at the centre of mass."""
+        edge, longest = self._pixels(10), self._pixels(75) / scale
+        power = 10.0 ** np.floor(np.log10(longest))
+        length = max(power * part for part in (1, 2, 5) if power * part <= longest)
+        end = edge + round(length * scale)
+        draw.line((edge, middle, end, middle), INK, self._pixels(2))
+        draw.text((end + self._pixels(5), middle), f"{length:g} mm", INK, _font(self._pixels(11)), "lm")
 
     def _marks(self) -> Image.Image:
         """Return the legend of the marks in the scene and of the diagram's bars."""
@@ -261,8 +272,8 @@ def _frames(
         for seconds in times.tolist():
             for take, overlay, panel in zip(takes, overlays, panels, strict=True):
                 row = take.row(seconds)
-                panel[:] = _view(stages[take.conditions], film.camera, take, row)
-                overlay.draw(panel, row, seconds)
+                panel[:], scale = _view(stages[take.conditions], film.camera, take, row)
+                overlay.draw(panel, row, seconds, scale)
             yield picture
             if progress:
                 progress(1 / len(times))
@@ -280,8 +291,8 @@ def _filmed_body(film: Film, conditions: Conditions) -> mujoco.MjModel:
     return model
 
 
-def _view(stage: tuple[gl.Renderer, mujoco.MjData], camera: str, take: Take, row: int) -> np.ndarray:
-    """Return the picture of the end of step `row`, (height, width, 3)."""
+def _view(stage: tuple[gl.Renderer, mujoco.MjData], camera: str, take: Take, row: int) -> tuple[np.ndarray, float]:
+    """Return the picture of the end of step `row`, (height, width, 3), and its pixels per mm at the centre of mass."""
     renderer, data = stage
     data.qpos[:] = take.qpos[row]
     mujoco.mj_kinematics(renderer.model, data)
@@ -295,7 +306,10 @@ def _view(stage: tuple[gl.Renderer, mujoco.MjData], camera: str, take: Take, row
     mark_planned_tips(renderer.scene, marks, take.planned_tip[row])
     feet = [renderer.model.site(name).id for name in take.conditions.body.feet]
     mark_feet(renderer.scene, marks, data.site_xpos[feet], take.stance[row])
-    return renderer.render()
+    lens = renderer.scene.camera[0]
+    distance = lens.frustum_near if lens.orthographic else float(np.dot(centre - lens.pos, lens.forward))
+    scale = renderer.height * lens.frustum_near / ((lens.frustum_top - lens.frustum_bottom) * distance)
+    return renderer.render(), scale
 
 
 def _faded(background: np.ndarray, share: float) -> Image.Image:
