@@ -118,18 +118,14 @@ def league(folder: Path) -> list[str]:
             io.save_figure(hexmj.plot(result, view), IMAGES / f"{name}.png")
     tasks = result.task.values.tolist()
     first = table("|".join(("controller", *tasks)), matrix_rows(result))
-    columns = {
-        "slow": "margin",
-        "fast": "margin",
-        "curve": "path_distance",
-        "turn": "heading_error",
-        "push": "recovery",
-    }
+    columns = [("slow", "margin"), ("fast", "margin"), ("slow", "cost"), ("fast", "cost")]
+    columns += [("curve", "path_distance"), ("turn", "heading_error"), ("push", "recovery")]
     rows = [
-        [name, *(two_digits(result[key].sel(task=task, controller=name).item()) for task, key in columns.items())]
+        [name, *(two_digits(result[key].sel(task=task, controller=name).item()) for task, key in columns)]
         for name in result.controller.values.tolist()
     ]
-    head = "controller|margin, slow|margin, fast|off path, curve [mm]|heading, turn [rad]|recovery, push"
+    head = "controller|margin, slow|margin, fast|cost, slow|cost, fast|off path, curve [mm]|heading, turn [rad]"
+    head += "|recovery, push"
     return [first, table(head, rows)]
 
 

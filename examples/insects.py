@@ -89,7 +89,7 @@ def draw_recovery(result: xr.Dataset) -> Figure:
     axes.legend(frameon=False, fontsize=9, loc="lower right")
     tidy(axes)
     finding = f"after a push as strong as the cockroach's, LDVS recovers in {back[1, 0]:.0f} ms"
-    head(figure, finding, f"{result.sizes['start']} starts of seed 17, V = {V:g}, V_p = {VP:g} mm/s")
+    head(figure, finding, f"{result.sizes['start']} starts of seed 17, V = {V:g}, $V_p$ = {VP:g} mm/s")
     return figure
 
 

@@ -67,6 +67,7 @@ def read_netcdf(path: Path | str) -> "xr.Dataset":
     """
     import xarray as xr
 
+    _check_file(path)
     try:
         return xr.load_dataset(path, engine="h5netcdf", decode_times=False)
     except (OSError, ValueError) as error:
@@ -79,7 +80,13 @@ def read_toml(path: Path | str) -> dict[str, Any]:
     Raises:
         InputError: the file cannot be read, or is not TOML.
     """
+    _check_file(path)
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read as TOML: {error}") from None
+
+
+def _check_file(path: Path | str) -> None:
+    if not Path(path).is_file():
+        raise InputError(f"{path}: there is no such file")

@@ -237,7 +237,7 @@ def test_a_closed_renderer_leaves_the_others_alone(plan):
     model = compile_body(take.conditions).model
     first, second = gl.Renderer(model, 240, 320), gl.Renderer(model, 240, 320)
     stage = second, mujoco.MjData(model)
-    before = _view(stage, "top", take, 0).copy()
+    before = _view(stage, "top", take, 0)[0].copy()
     _view((first, mujoco.MjData(model)), "side", take, 0)
     _view(stage, "top", take, 0)
     first.close()

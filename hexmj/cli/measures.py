@@ -57,7 +57,7 @@ class Walk(Command):
         files = [save_recording(walked, out / "recording.nc"), draw(walked, out / f"walk.{given.format}")]
         summary = recording_summary(walked)
         about = [walked[name].attrs for name in summary]
-        numbers = [four_digits(value) for value in summary.values()]
+        numbers = ["none" if value == float("inf") else four_digits(value) for value in summary.values()]
         rows = [(name, n, a["units"], a["long_name"]) for name, n, a in zip(summary, numbers, about, strict=True)]
         lines = [title, table(("outcome", "value", "unit", "meaning"), rows, None)]
         lines += [f"Next: hexmj {command} {files[0]}" for command in ("render", "page", "view")]

@@ -27,7 +27,7 @@ COMMON = ("controller", "velocity", "starts", "seed", "vp", "observation_time", 
 
 CONTROLLER = (
     "a weight set (hws, ldvs, uncoordinated, own, robust-0.3, lasting, ...), a baseline controller (wilson, graham,"
-    " walknet, ...; `hexmj league` runs all), a TOML file, module:object, file.py:object or an entry point"
+    " walknet, ...; `hexmj league --list` shows all), a TOML file, module:object, file.py:object or an entry point"
 )
 """Ways to name a controller, for the help texts."""
 

@@ -9,8 +9,8 @@ from hexmj.cli.command import Answer, Command
 from hexmj.cli.options import Output, Planning, Threads, build, conditions, controller
 from hexmj.cli.output import show
 from hexmj.command import Command as Twist
+from hexmj.errors import InputError
 from hexmj.timing import Stride
-from hexmj.validate import distinct
 
 if TYPE_CHECKING:
     from hexmj.replay.recording import Recording, Start
@@ -75,7 +75,7 @@ class Recordings:
     """Options of `hexmj page` and `hexmj export`."""
 
     recordings: tuple[Path, ...]
-    """One or more recordings (recording.nc of `hexmj walk`). A page plays one, or two side by side at the same time."""
+    """Recordings (recording.nc of `hexmj walk`)."""
 
 
 class Page(Command):
@@ -102,13 +102,17 @@ class Export(Command):
 
     sources = (Recordings, Output)
     positional = "recordings"
-    examples = ("results/walk/recording.nc", "first.nc second.nc --out tables")
+    examples = ("results/walk/recording.nc", "first/recording.nc second/recording.nc --out tables")
 
     def run(self, given: SimpleNamespace) -> Answer:
         from hexmj.replay.recording import load_recording
 
-        files = [given.out / f"{path.stem}.csv" for path in given.recordings]
-        distinct("CSV files", files)
+        if not given.recordings:
+            raise InputError("no recording is given; `hexmj walk` writes one")
+        stems = [path.stem for path in given.recordings]
+        if len(set(stems)) < len(stems):  # such as recording.nc of several walks
+            stems = [f"recording-{n}" for n in range(1, len(stems) + 1)]
+        files = [given.out / f"{stem}.csv" for stem in stems]
         lines, tables = [], []
         for path, file in zip(given.recordings, files, strict=True):
             recording = load_recording(path)

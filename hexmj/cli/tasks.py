@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hexmj.cli.command import Answer, StudyCommand
 from hexmj.cli.options import Figures, Output, Workers, build
 from hexmj.cli.output import show, table
+from hexmj.errors import InputError
 from hexmj.validate import distinct
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ class Task(StudyCommand):
     command to resume a stopped run."""
 
     study = "tasks.runner:TaskStudy"
-    sources = (TaskOptions, study, Output, Workers, Figures)
+    sources = (TaskOptions, study, Output, Workers)
     positional = "tasks"
     data = "tasks.nc"
     examples = ("slalom --controller ldvs graham --starts 20", "push mine.toml --controller mine.py:Mine")
@@ -57,7 +58,7 @@ class Task(StudyCommand):
 
         for task in study.tasks:
             yield f"{task.name}: {task.about}".rstrip(": ")
-            yield table(("controller", "fell", *MEANS.values(), "refused"), task_rows(result, task.name))
+            yield table(("controller", "walks", "fell", *MEANS.values(), "refused"), task_rows(result, task.name))
         yield ABOUT
 
 
@@ -73,10 +74,10 @@ class League(StudyCommand):
 
     def run(self, given: SimpleNamespace) -> Answer:
         if given.list:
-            from hexmj.tasks.league import EVERYONE
+            from hexmj.tasks.league import EVERYONE, TASKS
             from hexmj.tasks.task import known_tasks, load_task
 
-            show("Controllers: " + ", ".join(EVERYONE), "Tasks:")
+            show("Controllers: " + ", ".join(EVERYONE), "Tasks of the league: " + ", ".join(TASKS), "All tasks:")
             show(table(("task", "about"), [(name, load_task(name).about) for name in known_tasks()], None))
             raise SystemExit(0)
         return super().run(given)
@@ -110,5 +111,7 @@ def _study(given: SimpleNamespace, tasks: Sequence[str], controllers: Sequence[s
     from hexmj.tasks.runner import TaskStudy
     from hexmj.tasks.task import load_task
 
+    if not tasks:
+        raise InputError("no task is given; `hexmj league --list` shows the names of tasks")
     distinct("--controller", controllers)
     return build(TaskStudy, given, tasks=[load_task(name) for name in tasks], controllers=entrants(controllers))

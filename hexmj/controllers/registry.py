@@ -72,6 +72,8 @@ def load_controller(name: str) -> Controller:
     if file := parameter_file(name):
         table = read_toml(file)
         return _from_table(file, table) if "controller" in table else read_network(table, name, file.stem)
+    if name.endswith(".py"):
+        raise InputError(f"controller {name!r} lacks a class; expected {name}:CLASS")
     names = [*known_names()]
     expected = f"Expected file.toml, file.py:object, module:object or one of {', '.join(names)}"
     hints = [f"Did you mean {near}?" for near in get_close_matches(name.lower(), names, 1)]

@@ -14,6 +14,7 @@ import xarray as xr
 from hexmj.bodies.mjcf import compile_body
 from hexmj.body import STICK_INSECT, Body
 from hexmj.conditions import Conditions, unusual
+from hexmj.errors import InputError
 from hexmj.files import write_text
 from hexmj.legs import LEGS
 from hexmj.rendering.shapes import body_shapes, ground_shape, joined
@@ -54,6 +55,8 @@ def page(recordings: Sequence[xr.Dataset], path: Path | str, *, body: Body = STI
 def page_text(recordings: Sequence[xr.Dataset], body: Body = STICK_INSECT) -> str:
     """Return the HTML text that `page` writes for one or two recordings."""
     takes = takes_of(recordings, body)
+    if len(takes) > 2:
+        raise InputError(f"{len(takes)} recordings; a page plays one or two")
     data = [_page_data(recording, take) for recording, take in zip(recordings, takes, strict=True)]
     escapes = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}  # titles cannot end the script
     recordings_json = json.dumps(data, allow_nan=False).translate(str.maketrans(escapes))

@@ -29,6 +29,7 @@ from hexmj.stability import loss_time, walk_margin
 from hexmj.starts import draw_start
 from hexmj.timing import Acceleration, Stride, observation_duration
 from hexmj.tipping import LossesSoFar, Pendulum
+from hexmj.validate import number
 from hexmj.walks import PlannedWalk, one_start
 
 _STEP, _LEG, _ONCE = ("step",), ("step", "leg"), ()
@@ -88,7 +89,7 @@ class Start:
 
     controller: Controller
     velocity: float = 0.3
-    """Velocity V_r as a fraction of V_p, 0 <= V < 1; with `left` or `turn`, the velocity forward."""
+    """Velocity forward as a fraction of V_p; negative backward."""
     left: float = 0.0
     """Velocity to the left as a fraction of V_p; negative to the right."""
     turn: float = 0.0
@@ -105,7 +106,7 @@ class Start:
 
     def walk(self, physical: bool, threads: int | None = None) -> Any:
         """Return the `PhysicalWalk` if `physical`, otherwise the `PlannedWalk`."""
-        command: Any = Command(self.velocity, self.left, self.turn)
+        command: Any = Command(number("velocity", self.velocity, -1.0, 1.0), self.left, self.turn)
         straight = command.velocity is not None
         v = self.velocity if straight else pace(command, self.stride)
         time = float(observation_duration(self.observation_time, v, self.stride, self.acceleration))

@@ -48,7 +48,8 @@ MEANS = {
 """Variable of a result of `runner.run_task` -> its heading in the table of a task."""
 
 ABOUT = (
-    "fell, lost: frequencies of falls and of losses of static stability of the plan, with 95 % intervals; off path:"
+    "walks: number of walks that count; with events, those that do not fall before the first event;"
+    " fell, lost: frequencies of falls and of losses of static stability of the plan, with 95 % intervals; off path:"
     " RMS distance to the commanded path [mm]; heading: its error at the end [rad]; progress: distance along the path"
     " over the commanded one; margin: static margin over the length of the shortest leg; cost: cost of transport;"
     " recovery: median time after a push [time units]. Means over walks without a fall; -: none"
@@ -71,12 +72,14 @@ def entrants(names: Sequence[str]) -> dict[str, Controller]:
 
 
 def task_rows(result: "xr.Dataset", task: str) -> list[tuple[str, ...]]:
-    """Return a row of texts for each controller in a task: name, frequency of falls, `MEANS`, and refused starts."""
+    """Return a row of texts for each controller in a task: name, number of walks that count, frequency of falls,
+    `MEANS`, and refused starts."""
     rows = []
     for name in result.controller.values.tolist():
         cell = result.sel(task=task, controller=name)
         means = (frequency(cell, key) if key == "lost" else two_digits(cell[key].item()) for key in MEANS)
-        rows.append((name, frequency(cell, "fell"), *means, str(cell.n_refused.item())))
+        counts = str(cell.fell_starts.item()), frequency(cell, "fell")
+        rows.append((name, *counts, *means, str(cell.n_refused.item())))
     return rows
 
 
@@ -102,7 +105,7 @@ def league_markdown(result: "xr.Dataset") -> str:
     parts += ["", ABOUT + "."]
     for task in tasks:
         about = recorded["tasks"][task]["about"]
-        columns = ("controller", "fell", *MEANS.values(), "refused")
+        columns = ("controller", "walks", "fell", *MEANS.values(), "refused")
         parts += ["", f"### {task}: {about}", *markdown_table(columns, task_rows(result, task))]
     return "\n".join(parts) + "\n"
 

@@ -21,6 +21,7 @@ tables `[command]`, `[terrain]` and `[conditions]` hold those of `Command`, `Ter
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
 from math import pi
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
@@ -285,9 +286,9 @@ def load_task(name: str | Path) -> Task:
     if path.suffix != ".toml":
         path = FOLDER / f"{name}.toml"
         if not path.is_file():
-            raise InputError(
-                f"task {str(name)!r} does not exist; expected file.toml or one of {', '.join(known_tasks())}"
-            )
+            hints = [f"did you mean {near}?" for near in get_close_matches(str(name), known_tasks(), 1)]
+            expected = f"expected file.toml or one of {', '.join(known_tasks())}"
+            raise InputError(f"task {str(name)!r} does not exist; {(hints or [expected])[0]}")
     table: dict[str, Any] = {"name": path.stem} | read_toml(path)
     for key, kind in {"command": Command, "terrain": Terrain, "conditions": Conditions}.items():
         if isinstance(table.get(key), dict):
@@ -298,8 +299,10 @@ def load_task(name: str | Path) -> Task:
 
 
 def _event(table: dict[str, Any], path: Path) -> Event:
-    kind = choice("kind", table.get("kind", ""), EVENTS)
-    return _built(EVENTS[kind], {key: value for key, value in table.items() if key != "kind"}, f"{path} [[events]]")
+    where = f"{path} [[events]]"
+    if (kind := table.get("kind")) not in EVENTS:
+        raise InputError(f"{where}: kind = {short(kind)}; valid names: {', '.join(EVENTS)}")
+    return _built(EVENTS[kind], {key: value for key, value in table.items() if key != "kind"}, where)
 
 
 def _built(kind: type[Built], values: Mapping[str, Any], where: str) -> Built:
