@@ -87,9 +87,15 @@ def test_a_table_has_a_row_for_each_step(recording, run, tmp_path):
     pd.testing.assert_frame_equal(read, frame, check_dtype=False, check_exact=True)
 
 
+def test_recordings_with_the_same_name_get_numbers(recording, run, tmp_path):
+    path = hexmj.save_recording(recording, tmp_path / "walk.nc")
+    assert run("export", path, path, "--out", tmp_path)[0] == 0
+    assert sorted(file.name for file in tmp_path.glob("*.csv")) == ["recording-1.csv", "recording-2.csv"]
+
+
 def test_bad_exports_are_refused(recording, run, tmp_path):
     path = hexmj.save_recording(recording, tmp_path / "walk.nc")
-    for words in ((), (path, path), (tmp_path / "absent.nc",)):
+    for words in ((), (tmp_path / "absent.nc",)):
         assert run("export", *words, "--out", tmp_path)[0] == 2, words
     with pytest.raises(hexmj.InputError, match="step"):
         recording.isel(step=5).to_dataframe()

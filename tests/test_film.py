@@ -241,7 +241,7 @@ def test_a_closed_renderer_leaves_the_others_alone(plan):
     _view((first, mujoco.MjData(model)), "side", take, 0)
     _view(stage, "top", take, 0)
     first.close()
-    np.testing.assert_array_equal(_view(stage, "top", take, 0), before)
+    np.testing.assert_array_equal(_view(stage, "top", take, 0)[0], before)
     second.close()
     second.close()
 
