@@ -94,7 +94,7 @@ def test_recordings_with_the_same_name_get_numbers(recording, run, tmp_path):
 
 
 def test_bad_exports_are_refused(recording, run, tmp_path):
-    path = hexmj.save_recording(recording, tmp_path / "walk.nc")
+    hexmj.save_recording(recording, tmp_path / "walk.nc")
     for words in ((), (tmp_path / "absent.nc",)):
         assert run("export", *words, "--out", tmp_path)[0] == 2, words
     with pytest.raises(hexmj.InputError, match="step"):
