@@ -124,9 +124,8 @@ def league(folder: Path) -> list[str]:
         [name, *(two_digits(result[key].sel(task=task, controller=name).item()) for task, key in columns)]
         for name in result.controller.values.tolist()
     ]
-    head = "controller|margin, slow|margin, fast|cost, slow|cost, fast|off path, curve [mm]|heading, turn [rad]"
-    head += "|recovery, push"
-    return [first, table(head, rows)]
+    heads = "controller|margin, slow|margin, fast|cost, slow|cost, fast|off path, curve [mm]|heading, turn [rad]"
+    return [first, table(f"{heads}|recovery, push", rows)]
 
 
 def biology(folder: Path) -> list[str]:

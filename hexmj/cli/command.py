@@ -120,7 +120,7 @@ class StudyCommand(Command):
         raise NotImplementedError
 
     def write_more(self, given: SimpleNamespace, result: "xr.Dataset") -> list[Path]:
-        """Write the files of this command beside data and figures, such as a film, and return their paths."""
+        """Write the files of this command beside data and figures, such as tables, and return their paths."""
         return []
 
     def run(self, given: SimpleNamespace) -> Answer:

@@ -18,8 +18,8 @@ from hexmj.errors import InputError
 
 
 class Doctor(Command):
-    """List the versions of packages, and check films and a short walk. A failed check shows its error, and
-    a remedy if the cause is known; the exit code is then 1."""
+    """List the versions of packages, and check films and a short walk. A failed check shows its error, and a remedy if
+    the cause is known; the exit code is then 1."""
 
     sources = (Json,)
     examples = ("", "--json")

@@ -51,12 +51,6 @@ class WalkSettings:
         return self.duration * (1.0 - self.velocity) * self.n_starts
 
 
-def reach(stride: Stride) -> tuple[float, float]:
-    """Return how far a front foot can be ahead of O, and how far a hind foot can be behind O [mm]."""
-    origin = stride.geometry.origin
-    return max(origin) + stride.aep0, -(min(origin) + stride.pep_min)
-
-
 def observed(
     velocities: Sequence[float] | float,
     observation_time: str | float,
