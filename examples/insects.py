@@ -51,7 +51,7 @@ def draw_steps() -> Figure:
         size = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1)
         style = SERIES[n] | {"linestyle": "none", "capsize": 3, "label": name}
         lengths.errorbar(np.arange(6) + 0.2 * n - 0.1, np.nanmean(size, axis=0), np.nanstd(size, axis=0), **style)
-    above.set(xlim=(-26, 26), ylim=(-46, 46), aspect="equal", xlabel="to the right of O [mm]", ylabel="ahead of O [mm]")
+    above.set(xlim=(-30, 30), ylim=(-46, 46), aspect="equal", xlabel="to the right of O [mm]", ylabel="ahead of O [mm]")
     lengths.set(ylim=(0, None), ylabel="length of a stance, relative to the body [mm]")
     lengths.set_xticks(range(6), LEGS)
     lengths.legend(frameon=False, loc="lower right")
